@@ -49,12 +49,12 @@ from indoor_watch.views import view_changes
 from indoor_watch.watch_rules import rule_from
 from indoor_watch.watcher import Watcher
 from indoor_watch.ways import Ways
-from launcher.alarm import Alarm
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.pose import pose_of
-from surveillance_operator.notify.pipeline import notifier
-from surveillance_runtime.incidents import Cause, Severity, Told
+from surveillance_operator.notify.calls import open_sinks
+from surveillance_operator.notify.incident_keeper import IncidentKeeper
+from surveillance_runtime.incidents import Cause, IncidentPhase, IncidentUpdate, Severity
 from surveillance_simulation.camera.model import Camera, Conditions, covered, expose
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.lidar import LidarModel, scan
@@ -1209,7 +1209,7 @@ def telling_by_kind(trials: int) -> list[list[str]]:
 
 
 def measure_telling(times: int) -> list[list[str]]:
-    """Measure from the incident's line in the log to the webhook, with a picture."""
+    """Measure from the incident to the webhook, with a picture."""
     came = threading.Event()
 
     class Hook(BaseHTTPRequestHandler):
@@ -1232,20 +1232,20 @@ def measure_telling(times: int) -> list[list[str]]:
         (folder / 'n.yaml').write_text(
             f'sinks: {{hook: {{webhook: "http://127.0.0.1:{server.server_port}"}}}}'
         )
-        outbox, tell = notifier(folder / 'n.yaml', folder, 'Robot1', lambda _: None)
-        alarm = Alarm(tell, folder)
+        sinks = open_sinks(folder / 'n.yaml', folder, 'Robot1', lambda _: None)
+        keeper = IncidentKeeper(sinks.tell, folder)
         for number in range(times):
-            store.describe(number, json.dumps({'evidence': [shown]}))
             came.clear()
             begun = time.perf_counter()
-            line = Told(
-                Cause('event', str(number)), Severity.ALARM, f'event {number}', False
-            ).line()
-            alarm.hear('observer', line)
+            cause = Cause('event', str(number))
+            told = IncidentUpdate(
+                *(IncidentPhase.BEGIN, cause, Severity.ALARM, f'event {number}'), evidence=(shown,)
+            )
+            keeper.hear(told)
             came.wait(30.0)
             waits.append(time.perf_counter() - begun)
-        alarm.close()
-        outbox.close()
+        keeper.close()
+        sinks.outbox.close()
     server.shutdown()
     worst, median = max(waits), float(np.median(waits))
     rows = [['telling', 'aim', 'reached']]

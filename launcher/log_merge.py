@@ -59,12 +59,7 @@ class MergedLog:
         if colour is None:
             colour = self._terminal and not os.environ.get('NO_COLOR')
         self._colour = colour
-        self._heard: Callable[[str, str], None] = lambda _name, _text: None
         self._file = LogFile(path, self.warn) if path is not None else None
-
-    def listen(self, heard: Callable[[str, str], None]) -> None:
-        """Have each line of a process told as well: its node and its text."""
-        self._heard = heard
 
     def say(self, text: str) -> None:
         """Print a line of the launcher's own."""
@@ -86,7 +81,6 @@ class MergedLog:
             if (of_robot := '/'.join(origin.split('.')[-2:])) in self._names:
                 name = of_robot
             if name in self._names:
-                self._heard(name, message)
                 self._write(name, severity, message)
             else:
                 self._write(process, severity, f'{origin}: {message}')

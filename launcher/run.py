@@ -33,6 +33,7 @@ from surveillance_runtime.run_options import (
 
 NOT_RECORDED = 'off'
 RECORDER, MARKERS, PAGE = node_table.RECORDER, node_table.MARKERS, 'mission_page'
+ALARM = node_table.ALARM
 OBSERVER = 'observer'
 _REMAP = re.compile(r'[~/\w]+:=[~/\w]+\Z', re.ASCII)
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
@@ -219,14 +220,14 @@ class Run:
         '',
         group=_PROCESSES,
         metavar='COMMAND',
-        help='run this when the robot needs a person; the last argument says why',
+        help=OPTIONS['alarm'].help,
     )
     notify: Path | None = _option(
         '--notify',
         group=_PROCESSES,
         type=Path,
         metavar='FILE',
-        help='whom else to tell: webhooks, MQTT, e-mail, commands (notify.yaml)',
+        help=OPTIONS['notify'].help,
     )
     network: bool = _switch(
         '--network',
@@ -320,8 +321,7 @@ class Run:
         if alarm and shutil.which(alarm[0]) is None:
             raise ValueError(f'--alarm {self.alarm!r}: {alarm[0]!r} cannot be run')
         if self.notify is not None:
-            from surveillance_operator.notify.settings import read_notify_file
-            from surveillance_operator.notify.sinks import sink_of
+            from surveillance_operator.notify.sinks import read_notify_file, sink_of
 
             try:
                 for sink in read_notify_file(self.notify):
@@ -348,6 +348,8 @@ class Run:
         With `only` nothing is recorded; what was asked for by its own option starts.
         """
         names = []
+        if not self.only or self.alarm or self.notify is not None:
+            names.append(ALARM)
         if self.record != NOT_RECORDED and not self.only:
             names += [RECORDER, MARKERS]
         if self.watch is not None:

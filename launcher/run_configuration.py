@@ -30,6 +30,7 @@ from surveillance_runtime.profile import (
 from surveillance_runtime.run_files import RECORDING, TRUTH
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
+    alarm_entries,
     for_node,
     full_name,
     mode_entries,
@@ -163,6 +164,7 @@ def _observer_entries(config: Path, run: Run, folder: Path) -> Iterator[Entry]:
     """Yield what the recorder and the page are told."""
     yield for_node(RECORDER, 'folder', str(folder / RECORDING), 'this run')
     yield for_node(RECORDER, 'keep', float(run.keep), '--keep')
+    yield from alarm_entries(folder, command=run.alarm, notify=run.notify)
     if run.watch is not None:
         yield from watch_entries(folder, run.watch)
     if run.has_page:

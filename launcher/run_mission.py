@@ -7,15 +7,16 @@ import shlex
 import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from floor_plans.writing import copy_place
 from launcher import run_folder
-from launcher.alarm import Alarm, caller
 from launcher.environment import COMMAND, interpreter
 from launcher.fleet_launch import RobotProcesses, parts, without_parts
 from launcher.instance_lock import claim
 from launcher.log_merge import MergedLog
+from launcher.node_deaths import NodeDeaths
 from launcher.run import NOT_RECORDED, Run
 from launcher.run_configuration import (
     check_assignments,
@@ -107,6 +108,7 @@ def run_mission(
             replace(each, leads=True, ends_run=True) if each.name == job.node else each
             for each in programs
         ]
+    alarm = next((each.name for each in programs if each.name == node_table.ALARM), None)
     names = [part.name(node.name) for part in team for node in part.everyone]
     names += [part.name(COMPOSED) for part in team if run.composed]
     log = MergedLog(None, names, path=folder / LAUNCH_LOG)
@@ -130,20 +132,19 @@ def run_mission(
         usual = (config / 'mission.rviz').read_text(encoding='utf-8')
         layout.write_text(fleet_layout(usual, robots, run.namespace), encoding='utf-8')
         log.say(f'or in RViz: rviz2 -d {_short(layout)}')
-    outbox, tell = None, None
-    if run.notify is not None:
-        from surveillance_ontology.patrol_vocabulary import ROBOT
-        from surveillance_operator.notify.pipeline import notifier
-
-        robot = (run.namespace or '').strip('/') or ('fleet' if robots else ROBOT)
-        outbox, tell = notifier(run.notify, folder, robot, log.warn)
-    alarm = Alarm(caller(run.alarm, log, tell or (lambda _: None)), folder)
-    log.listen(alarm.hear)
-    supervisor = Supervisor(programs, log, on_trouble=alarm.trouble, on_restart=alarm.restarted)
+    deaths = NodeDeaths(
+        lambda line: alarm is not None and supervisor.send(alarm, line),
+        partial(_call_without_alarm, run.alarm, log),
+        folder,
+    )
+    supervisor = Supervisor(
+        programs,
+        log,
+        on_trouble=deaths.trouble,
+        on_restart=deaths.restarted,
+        on_tick=deaths.advance,
+    )
     code = _supervised(run, team, supervisor, folder, log)
-    alarm.close()
-    if outbox is not None:
-        outbox.close()
     for line in what_to_look_at(folder):
         log.plain(line)
     log.close()
@@ -154,6 +155,16 @@ def run_mission(
     if job is None or code not in (0, EXIT_CUT):
         return code
     return job.close(folder) or code
+
+
+def _call_without_alarm(command: str, log: MergedLog, text: str) -> None:
+    """Call a person where the node that does so does not live."""
+    log.warn(f'alarm: {text}')
+    if command:
+        from surveillance_operator.notify.calls import run_command
+
+        if problem := run_command(command, text):
+            log.error(problem)
 
 
 def checked(run: Run, config: Path) -> tuple[Run, tuple[RobotProcesses, ...]]:

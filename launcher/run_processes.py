@@ -132,5 +132,10 @@ def programs_of(
     # and pictures keep what compares them busy.
     if members := [node for node in observers if node.name in (RECORDER, MARKERS)]:
         programs.append(program(members))
-    programs += [program([node]) for node in observers if node.name not in (RECORDER, MARKERS)]
+    programs += [
+        # What the launcher tells of comes on the alarm's input.
+        replace(program([node]), takes_input=node.name == node_table.ALARM)
+        for node in observers
+        if node.name not in (RECORDER, MARKERS)
+    ]
     return programs

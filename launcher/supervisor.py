@@ -101,6 +101,7 @@ class RunningProcess:
     heartbeats: Heartbeats | None = None
     activity: Activity = field(default_factory=Activity)
     ended_for: str = ''
+    died_of: str = ''
     read: Callable[[], bool] = lambda: False
 
     @property
@@ -121,7 +122,8 @@ class Supervisor:
         at_once: how many may come up at the same time; default: one more than there are
             processors, for each waits at times.
         on_trouble: called with one line when a program dies again and again.
-        on_restart: called with the name of a program that is started again.
+        on_restart: called with the name of a program that is started again, and why.
+        on_tick: called in each round, with steady time in seconds.
 
     Attributes:
         time_is_over: whether it stopped because the time that was asked for was over.
@@ -134,7 +136,8 @@ class Supervisor:
         pauses: Sequence[float] = PAUSES,
         at_once: int | None = None,
         on_trouble: Callable[[str], None] = lambda _text: None,
-        on_restart: Callable[[str], None] = lambda _name: None,
+        on_restart: Callable[[str, str], None] = lambda _name, _why: None,
+        on_tick: Callable[[float], None] = lambda _now: None,
     ) -> None:
         self.children = {
             program.name: RunningProcess(program, Restarts(pauses)) for program in programs
@@ -144,6 +147,7 @@ class Supervisor:
         self._log = log
         self._on_trouble = on_trouble
         self._on_restart = on_restart
+        self._on_tick = on_tick
         self._look_at = 0.0
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
@@ -248,7 +252,7 @@ class Supervisor:
         )
         self._log.say(f'started {child.program.name} (process {process.pid})')
         if child.starts > 1:
-            self._on_restart(child.program.name)
+            self._on_restart(child.program.name, child.died_of)
 
     @contextlib.contextmanager
     def _pipe(self, on_read: Callable[[bytes], None]) -> Iterator[int]:
@@ -345,7 +349,7 @@ class Supervisor:
             self._log.error(f'{name} cannot start with this configuration: stopping')
             self.stop(code)
             return
-        why = child.ended_for or describe_exit(code)
+        why = child.died_of = child.ended_for or describe_exit(code)
         if child.program.ends_run:
             self._log.error(f'{name} died ({why}): the run ends with what there is')
             self.stop(EXIT_CUT)
@@ -435,6 +439,7 @@ class Supervisor:
 
     def _keep_time(self, end: float | None) -> None:
         now = time.monotonic()
+        self._on_tick(now)
         if self._log.broken:
             self.stop()
         if end is not None and now >= end and self._stopping_since is None:

@@ -18,6 +18,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
+            'alarm = surveillance_operator.alarm_node:main',
             'console = surveillance_operator.console_node:main',
             'mission_markers = surveillance_operator.mission_markers_node:main',
             'mission_page = surveillance_operator.mission_page_node:main',

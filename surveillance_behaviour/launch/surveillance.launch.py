@@ -28,7 +28,7 @@ from surveillance_runtime.configuration import Configuration, Entry, Layer
 from surveillance_runtime.event_log import record_in
 from surveillance_runtime.fleet_parts import Choice, TeamPart, team_parts
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
-from surveillance_runtime.node_table import MARKERS, RECORDER, find, select
+from surveillance_runtime.node_table import ALARM, MARKERS, RECORDER, find, select
 from surveillance_runtime.node_table import Node as NodeOfTable
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.profile import (
@@ -43,6 +43,7 @@ from surveillance_runtime.run_options import OPTIONS, left_out
 from surveillance_runtime.run_parameters import (
     OBSERVER,
     PAGE,
+    alarm_entries,
     for_node,
     full_name,
     mode_entries,
@@ -196,7 +197,7 @@ def _has_page(given: Mapping[str, str]) -> bool:
 
 def _observers(given: Mapping[str, str]) -> list[NodeOfTable]:
     """Return the nodes that only look on."""
-    names = [MARKERS]
+    names = [ALARM, MARKERS]
     if given['record']:
         names.append(RECORDER)
     if given['watch']:
@@ -214,6 +215,8 @@ def _traces(given: Mapping[str, str], folder: Path, part: TeamPart, place: Path)
         copy_place(place, kept / PLACE)
         yield from record_entries(record_in(kept))
         yield for_node(RECORDER, 'folder', str(kept / RECORDING), 'record')
+    notify = Path(given['notify']) if given['notify'] else None
+    yield from alarm_entries(kept, command=given['alarm'], notify=notify)
     if given['watch']:
         yield from watch_entries(kept, Path(given['watch']))
     if given['stage']:

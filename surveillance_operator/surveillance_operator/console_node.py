@@ -32,9 +32,10 @@ from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_state import MissionState
 from surveillance_operator.mission_words import why as reason
-from surveillance_runtime.logging import clean, print_lines
+from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
+from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 

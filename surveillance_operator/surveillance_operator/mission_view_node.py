@@ -19,8 +19,9 @@ from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.stop_button import StopButton
 from surveillance_operator.watch.view import show_moving, show_once
-from surveillance_runtime.logging import clean, print_lines
+from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 
 POLL_PERIOD = 0.1

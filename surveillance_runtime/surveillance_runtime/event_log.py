@@ -68,7 +68,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Kind:
+class EntryKind:
     """One kind of entry.
 
     Attributes:
@@ -90,52 +90,54 @@ class Kind:
     mark: str = ''
 
 
-KINDS: Mapping[str, Kind] = {
-    'start': Kind(('machine', 'place', 'places')),
-    'map': Kind(('places',)),
-    'exploring': Kind(('place', 'seconds'), frozenset({'seconds'})),
-    'viewpoint': Kind(('place', 'point')),
-    'look': Kind(('place', 'sides', 'left_out')),
-    'verify': Kind(('place', 'number', 'found')),
-    'recharge': Kind(
+KINDS: Mapping[str, EntryKind] = {
+    'start': EntryKind(('machine', 'place', 'places')),
+    'map': EntryKind(('places',)),
+    'exploring': EntryKind(('place', 'seconds'), frozenset({'seconds'})),
+    'viewpoint': EntryKind(('place', 'point')),
+    'look': EntryKind(('place', 'sides', 'left_out')),
+    'verify': EntryKind(('place', 'number', 'found')),
+    'recharge': EntryKind(
         ('place', 'seconds'),
         frozenset({'seconds'}),
         section=Section('Recharges', ('place', 'seconds'), is_open=True),
         words=('place', 'seconds'),
         mark='recharge',
     ),
-    'failure': Kind(
+    'failure': EntryKind(
         ('what', 'reason'),
         section=Section('Failures', ('what', 'reason'), is_open=True),
         words=('what', 'reason'),
         mark='failure',
     ),
-    'decision': Kind(
+    'decision': EntryKind(
         ('place', 'rule', 'reason'),
         section=Section('Decisions', ('place', 'rule', 'reason')),
         words=('place', 'rule', 'reason'),
         mark='decision',
     ),
-    'visit': Kind(
+    'visit': EntryKind(
         ('place', 'distance'),
         frozenset({'distance'}),
         section=Section('Visits', ('place', 'distance')),
         words=('place',),
     ),
-    'promises': Kind(('places',)),
-    'end': Kind(()),
-    'snapshot': Kind(('account',)),
-    'incident': Kind(
+    'promises': EntryKind(('places',)),
+    'end': EntryKind(()),
+    'snapshot': EntryKind(('account',)),
+    'incident': EntryKind(
         ('id', 'phase', 'node', 'kind', 'name', 'severity', 'text'), is_of_mission=False
     ),
-    'finding': Kind(('number', 'kind', 'seen', 'place', 'state', 'severity'), is_of_mission=False),
-    'answer': Kind(
+    'finding': EntryKind(
+        ('number', 'kind', 'seen', 'place', 'state', 'severity'), is_of_mission=False
+    ),
+    'answer': EntryKind(
         ('line', 'answer'), is_of_mission=False, section=Section('Answers', ('line', 'answer'))
     ),
-    'restart': Kind(
+    'restart': EntryKind(
         ('node', 'why'), is_of_mission=False, section=Section('Restarts', ('node', 'why'))
     ),
-    'parameter': Kind(
+    'parameter': EntryKind(
         ('node', 'name', 'value'),
         is_of_mission=False,
         section=Section('Parameters changed', ('node', 'name', 'value')),
@@ -185,7 +187,7 @@ class RecordEntry:
     boot: str = ''
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> EntryKind:
         """What is known of entries like this."""
         return KINDS[self.name]
 

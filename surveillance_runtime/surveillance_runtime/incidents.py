@@ -1,9 +1,10 @@
 """Incidents: what keeps a mission from its purpose, or what a person should know of.
 
 An incident has a cause, a severity, a beginning and an end. A node begins and ends it
-(`PatrolNode.incidents`), which writes a line of the log and a finding of the node's health. The
-launcher reads the lines of all nodes into an `IncidentBook`, which says what is to be told when:
-once at the beginning, again at distances that double, and once at the end.
+(`PatrolNode.incidents`), which publishes it on the topic `incidents` (`incident_topic`), logs it
+and makes it a finding of the node's health. The node `alarm` keeps an `IncidentBook` of them, which
+says what is to be told when: once at the beginning, again at distances that double, and once at the
+end.
 
     node.incidents.begin(('door', 'D1'), 'D1 is closed: nothing else leads out of R1')
     node.incidents.end(('door', 'D1'))
@@ -11,12 +12,14 @@ once at the beginning, again at distances that double, and once at the end.
 
 from __future__ import annotations
 
-import re
+import json
 import threading
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class Severity(StrEnum):
@@ -26,6 +29,14 @@ class Severity(StrEnum):
     """A person should know; nobody is called."""
     ALARM = 'alarm'
     """A person is called."""
+
+
+class IncidentPhase(StrEnum):
+    """How far an incident is when it is told of."""
+
+    BEGIN = 'begin'
+    UPDATE = 'update'
+    END = 'end'
 
 
 class Cause(NamedTuple):
@@ -45,70 +56,181 @@ class Cause(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Incident:
-    """One incident.
+class SeenThing:
+    """What the observer saw that made an incident.
 
     Attributes:
-        node: Who tells of it.
-        cause: What it is about.
-        text: One sentence.
-        severity: How much it matters.
-        began: When it began, seconds.
-        ended: When it ended; None: it goes on.
+        number: Of the observer's event.
+        kind, seen, subject: What it is, in which state, and its name; empty: it has none.
+        position: Where, map frame, metres; None: not known.
+        confidence: 0 to 1.
+        rule: The rule that makes it matter, in words.
     """
 
-    node: str
+    number: int
+    kind: str
+    seen: str
+    subject: str = ''
+    position: tuple[float, float] | None = None
+    confidence: float = 0.0
+    rule: str = ''
+
+
+@dataclass(frozen=True)
+class IncidentUpdate:
+    """An incident as its owner tells of it: it begins, it changes, or it is over.
+
+    Attributes:
+        phase: Which of these.
+        cause: What it is about.
+        severity: How much it matters.
+        text: One sentence; at the end what made it end.
+        id: The same from its beginning to its end.
+        since: When it began, seconds on the owner's clock.
+        robot: Whose it is; empty: of a run that has no names.
+        node: Who tells of it.
+        place: Where; empty: nowhere in particular.
+        action: What a person is to do; empty: nobody knows.
+        acknowledged_by: Who takes care of it; empty: nobody yet.
+        evidence: Names of pictures that show it.
+        finding: What the observer saw; None: it is of something else.
+    """
+
+    phase: IncidentPhase
     cause: Cause
-    text: str
     severity: Severity
-    began: float
-    ended: float | None = None
+    text: str
+    id: str = ''
+    since: float = 0.0
+    robot: str = ''
+    node: str = ''
+    place: str = ''
+    action: str = ''
+    acknowledged_by: str = ''
+    evidence: tuple[str, ...] = ()
+    finding: SeenThing | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether it is over."""
+        return self.phase is IncidentPhase.END
+
+    @property
+    def owner(self) -> str:
+        """Who tells of it, with the robot that it is of."""
+        return f'{self.robot}/{self.node}' if self.robot else self.node
+
+    def words(self) -> str:
+        """Return it as a log has it, for people."""
+        word = 'over' if self.over else self.severity.value
+        return f'incident [{self.cause}, {word}]: {self.text}'
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> IncidentUpdate:
+        """Return what `to_json` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else.
+        """
+        given = dict(values)
+        kind, name = given['cause']
+        given['cause'] = Cause(str(kind), str(name))
+        given['phase'], given['severity'] = (
+            IncidentPhase(given['phase']),
+            Severity(given['severity']),
+        )
+        given['evidence'] = tuple(str(each) for each in given.get('evidence', ()))
+        if (seen := given.get('finding')) is not None:
+            place = seen['position']
+            at = None if place is None else (float(place[0]), float(place[1]))
+            given['finding'] = SeenThing(**{**seen, 'position': at})
+        return cls(**given)
+
+    def to_line(self) -> str:
+        """Return it as one line, as the launcher hands it to the node `alarm`, see `from_line`."""
+        return json.dumps(self.to_json())
+
+    @classmethod
+    def from_line(cls, line: str) -> IncidentUpdate:
+        """Return what `to_line` gave.
+
+        Raises:
+            ValueError: It is something else.
+        """
+        try:
+            return cls.from_json(json.loads(line))
+        except (KeyError, TypeError, AttributeError) as error:
+            raise ValueError(f'expected an incident, got {line[:60]!r}') from error
 
 
 # --- in a node ---
 
 
-class Told(NamedTuple):
-    """A line about an incident: it began or changed, or it is over."""
-
-    cause: Cause
-    severity: Severity
-    text: str
-    over: bool
-
-    def line(self) -> str:
-        """Return the line of the log, see `read_line`."""
-        word = 'over' if self.over else self.severity.value
-        return f'incident [{self.cause}, {word}]: {self.text}'
-
-
 class Incidents:
-    """The incidents of one node; safe from any thread.
+    """The incidents of one owner; safe from any thread.
 
     Args:
         tell: Called with each beginning, change and end; must not block.
+        node: The owner's name.
+        robot: Whose node it is; empty: of a run that has no names.
+        now: Seconds on the owner's clock.
     """
 
-    def __init__(self, tell: Callable[[Told], object]) -> None:
+    def __init__(
+        self,
+        tell: Callable[[IncidentUpdate], object],
+        node: str = '',
+        robot: str = '',
+        now: Callable[[], float] = time.time,
+    ) -> None:
         self._tell = tell
+        self._node, self._robot, self._now = node, robot, now
         self._lock = threading.Lock()
-        self._open: dict[Cause, Told] = {}
+        self._open: dict[Cause, IncidentUpdate] = {}
 
     def begin(
-        self, cause: tuple[str, str], text: str, severity: Severity = Severity.WARNING
+        self,
+        cause: tuple[str, str],
+        text: str,
+        severity: Severity = Severity.WARNING,
+        **more: Any,
     ) -> None:
-        """Begin an incident; one that goes on gets another text or severity.
+        """Begin an incident; one that goes on gets another text, severity or the like.
 
         Args:
             cause: Kind and name, see `Cause`.
             text: One sentence that names the cause.
             severity: Whether somebody is called.
+            **more: Others of `IncidentUpdate`'s: place, action, acknowledged_by, evidence, finding.
         """
-        told = Told(Cause(*cause), severity, text, over=False)
+        about = Cause(*cause)
         with self._lock:
-            if self._open.get(told.cause) == told:
-                return
-            self._open[told.cause] = told
+            known = self._open.get(about)
+            if known is None:
+                told = IncidentUpdate(
+                    *(
+                        IncidentPhase.BEGIN,
+                        about,
+                        severity,
+                        text,
+                        uuid.uuid4().hex[:12],
+                        self._now(),
+                    ),
+                    robot=self._robot,
+                    node=self._node,
+                    **more,
+                )
+            else:
+                told = replace(
+                    known, phase=IncidentPhase.UPDATE, severity=severity, text=text, **more
+                )
+                if told == replace(known, phase=IncidentPhase.UPDATE):
+                    return
+            self._open[about] = told
         self._tell(told)
 
     def end(self, cause: tuple[str, str], text: str = '') -> None:
@@ -121,7 +243,7 @@ class Incidents:
         with self._lock:
             begun = self._open.pop(Cause(*cause), None)
         if begun is not None:
-            self._tell(begun._replace(text=text or begun.text, over=True))
+            self._tell(replace(begun, phase=IncidentPhase.END, text=text or begun.text))
 
     def end_all(self, kind: str, text: str = '') -> None:
         """End all incidents of one kind of cause."""
@@ -133,22 +255,13 @@ class Incidents:
         with self._lock:
             return tuple(self._open)
 
+    def updates(self) -> tuple[IncidentUpdate, ...]:
+        """Return those that go on, as they were told last."""
+        with self._lock:
+            return tuple(replace(each, phase=IncidentPhase.UPDATE) for each in self._open.values())
+
 
 # --- for all nodes ---
-
-_LINE = re.compile(r'incident \[(\w+) (.*?), (warning|alarm|over)\]: (.*)')
-
-
-def read_line(line: str) -> Told | None:
-    """Return what a line of a node's log says of an incident; None: it says something else."""
-    match = _LINE.match(line)
-    if match is None:
-        return None
-    kind, name, word, text = match.groups()
-    over = word == 'over'
-    severity = Severity.ALARM if over else Severity(word)
-    return Told(Cause(kind, name), severity, text, over)
-
 
 FIRST_AGAIN = 240.0
 """The second call for an incident comes after this time, seconds; then the distance doubles: five
@@ -157,23 +270,43 @@ LONGEST_AGAIN = 4 * 3600.0
 """The longest distance between two calls, seconds."""
 SETTLED = 5.0
 """An end counts when the incident has not begun again for this long, seconds."""
+TOLD_AGAIN = 12 * SETTLED
+"""So long after its owner was started again an incident ends that is not told again, seconds."""
 CONSEQUENCE = 'robot'
 """Kind of the causes that say how the robot fares. While what keeps it from its purpose is told by
 a cause of another kind, nobody is called for them as well."""
 KEPT = 1000
 """How many incidents that are over are kept."""
+MOST_OPEN = 1000
+"""How many go on at most: beyond these, of what a stranger may make up, none is taken."""
+
+
+@dataclass(frozen=True)
+class Incident:
+    """One incident, from its beginning to its end, as the book has it.
+
+    Attributes:
+        told: What was said of it last while it went on.
+        began: When it began, seconds on the book's clock.
+        ended: When it ended; None: it goes on.
+        calls: How often somebody was called.
+    """
+
+    told: IncidentUpdate
+    began: float
+    ended: float | None = None
+    calls: int = 0
 
 
 @dataclass
 class _Open:
     incident: Incident
-    calls: int = 0
     next_call: float = 0.0
     ends_at: float | None = None
     ending: str = ''
 
 
-class Call(NamedTuple):
+class IncidentCall(NamedTuple):
     """A person is called.
 
     Attributes:
@@ -198,43 +331,68 @@ class IncidentBook:
     """
 
     def __init__(
-        self, call: Callable[[Call], object], note: Callable[[Incident], object] = lambda _i: None
+        self,
+        call: Callable[[IncidentCall], object],
+        note: Callable[[Incident], object] = lambda _i: None,
     ) -> None:
         self._call = call
         self._note = note
         self._open: dict[tuple[str, Cause], _Open] = {}
         self.past: list[Incident] = []
 
-    def hear(self, node: str, told: Told, now: float) -> None:
-        """Take what a node tells.
+    def hear(self, told: IncidentUpdate, now: float) -> None:
+        """Take what the owner of an incident tells.
 
         Args:
-            node: The node.
             told: What it tells.
             now: Steady time, seconds.
         """
-        key = node, told.cause
+        key = told.owner, told.cause
         known = self._open.get(key)
         if told.over:
             if known is not None and known.ends_at is None:
                 known.ends_at, known.ending = now + SETTLED, told.text
             return
         if known is None:
-            incident = Incident(node, told.cause, told.text, told.severity, now)
+            if len(self._open) >= MOST_OPEN:
+                return
+            incident = Incident(told, now)
             self._open[key] = _Open(incident, next_call=now)
             self._note(incident)
         else:
-            worse = Severity.ALARM in (told.severity, known.incident.severity)
-            severity = Severity.ALARM if worse else told.severity
-            known.incident = replace(known.incident, text=told.text, severity=severity)
+            worse = Severity.ALARM in (told.severity, known.incident.told.severity)
+            # One that has begun again within moments is the same for people.
+            told = replace(told, id=known.incident.told.id)
+            if worse:
+                told = replace(told, severity=Severity.ALARM)
+            known.incident = replace(known.incident, told=told)
             known.ends_at = None
         self.advance(now)
 
-    def restarted(self, node: str, now: float) -> None:
+    def restore(
+        self, told: IncidentUpdate, began: float, calls: int, called: float, now: float
+    ) -> None:
+        """Take an incident that an earlier book had when its process ended.
+
+        It ends unless its owner tells of it again.
+
+        Args:
+            told: What was known of it.
+            began: When it began, seconds on this book's clock.
+            calls: How often somebody was called.
+            called: When that was last.
+            now: Steady time, seconds.
+        """
+        incident = Incident(told, began, calls=calls)
+        next_call = called + _again(calls) if calls else now
+        ending = 'it was not told again after a restart'
+        self._open[told.owner, told.cause] = _Open(incident, next_call, now + TOLD_AGAIN, ending)
+
+    def restarted(self, owner: str, now: float) -> None:
         """Take that a node was started again: what it told of ends, unless it tells of it again."""
         for (teller, _), each in self._open.items():
-            if teller == node and each.ends_at is None:
-                each.ends_at, each.ending = now + 12 * SETTLED, f'{node} was started again'
+            if teller == owner and each.ends_at is None:
+                each.ends_at, each.ending = now + TOLD_AGAIN, f'{owner} was started again'
 
     def advance(self, now: float) -> float | None:
         """Call whom it is time to call; return when to look again, None: after news."""
@@ -249,34 +407,49 @@ class IncidentBook:
             due.append(each.next_call)
         return min(due, default=None)
 
+    def close(self, now: float) -> None:
+        """End: what is over is told as such, though it might have begun again."""
+        for key, each in list(self._open.items()):
+            if each.ends_at is not None and each.ends_at <= now + SETTLED:
+                del self._open[key]
+                self._finish(each, each.ends_at - SETTLED)
+
     def open(self) -> tuple[Incident, ...]:
         """Return the incidents that go on."""
         return tuple(each.incident for each in self._open.values())
 
     def _calling(self) -> Iterator[_Open]:
         """Yield the incidents for which somebody is called."""
-        alarms = [e for e in self._open.values() if e.incident.severity is Severity.ALARM]
-        explained = any(e.incident.cause.kind != CONSEQUENCE for e in alarms)
+        alarms = [e for e in self._open.values() if e.incident.told.severity is Severity.ALARM]
+        explained = any(e.incident.told.cause.kind != CONSEQUENCE for e in alarms)
         for each in alarms:
-            if each.incident.cause.kind != CONSEQUENCE or not explained:
+            told = each.incident.told
+            # Who takes care of it need not be called again.
+            if not told.acknowledged_by and (told.cause.kind != CONSEQUENCE or not explained):
                 yield each
 
     def _call_for(self, each: _Open, now: float) -> None:
         incident = each.incident
-        since = f' (for {_span(now - incident.began)} now)' if each.calls else ''
-        each.next_call = now + min(FIRST_AGAIN * 2.0**each.calls, LONGEST_AGAIN)
-        each.calls += 1
-        self._call(Call(incident.text + since, incident, each.calls, over=False))
+        since = f' (for {_span(now - incident.began)} now)' if incident.calls else ''
+        each.next_call = now + _again(incident.calls + 1)
+        each.incident = incident = replace(incident, calls=incident.calls + 1)
+        self._call(IncidentCall(incident.told.text + since, incident, incident.calls, over=False))
 
     def _finish(self, each: _Open, now: float) -> None:
         incident = replace(each.incident, ended=now)
         self._note(incident)
         self.past = [*self.past[-KEPT:], incident]
-        if each.calls:
+        if incident.calls:
+            text = incident.told.text
             lasted = _span(now - incident.began)
-            ending = f': {each.ending}' if each.ending != incident.text else ''
-            text = f'all clear after {lasted}: {incident.text}{ending}'
-            self._call(Call(text, incident, each.calls, over=True))
+            ending = f': {each.ending}' if each.ending != text else ''
+            all_clear = f'all clear after {lasted}: {text}{ending}'
+            self._call(IncidentCall(all_clear, incident, incident.calls, over=True))
+
+
+def _again(calls: int) -> float:
+    """Return after how long somebody is called again who was called so often, seconds."""
+    return min(FIRST_AGAIN * 2.0 ** (calls - 1), LONGEST_AGAIN)
 
 
 def _span(seconds: float) -> str:

@@ -20,8 +20,8 @@ from typing import Any
 import rclpy.impl.rcutils_logger as rcutils
 from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
 
-LONGEST = 1000
-"""Characters of a line; what is longer loses its middle."""
+from surveillance_runtime.one_line import clean
+
 LINES_PER_SECOND, LINES_AT_ONCE = 7.0, 40.0
 """Lines of a node for each second in the long run, and after a pause."""
 WARNINGS_PER_SECOND, WARNINGS_AT_ONCE = 2.0, 20.0
@@ -32,15 +32,6 @@ WARNINGS_PER_SECOND, WARNINGS_AT_ONCE = 2.0, 20.0
 rcutils._internal_callers.append(os.path.realpath(__file__))
 
 
-def clean(text: str) -> str:
-    """Return a text as one line of bounded length: control characters are written as escapes."""
-    if len(text) > LONGEST:
-        left_out = len(text) - LONGEST
-        half = LONGEST // 2
-        text = f'{text[:half]} ... ({left_out} characters left out) ... {text[-half:]}'
-    return without_controls(text, kept='')
-
-
 def print_lines(text: str) -> None:
     """Print a text and its line end on standard output, in one write.
 
@@ -48,18 +39,6 @@ def print_lines(text: str) -> None:
     """
     sys.stdout.write(text + '\n')
     sys.stdout.flush()
-
-
-def without_controls(text: str, kept: str = '\n\t') -> str:
-    """Return a text with its control characters written as escapes, but for those to be kept."""
-    if text.isprintable():
-        return text
-    return ''.join(
-        each
-        if each.isprintable() or each in kept
-        else each.encode('unicode_escape').decode('ascii')
-        for each in text
-    )
 
 
 @contextmanager

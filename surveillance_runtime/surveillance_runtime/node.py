@@ -48,8 +48,10 @@ from surveillance_runtime.configuration import (
     read_schema,
 )
 from surveillance_runtime.health import Health
-from surveillance_runtime.incidents import Incidents, Severity, Told
-from surveillance_runtime.logging import CleanLogger, clean
+from surveillance_runtime.incident_topic import IncidentPublisher
+from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
+from surveillance_runtime.logging import CleanLogger
+from surveillance_runtime.one_line import clean
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
 
 if TYPE_CHECKING:
@@ -102,7 +104,8 @@ class PatrolNode(Node):
         unusable: Whether that is its configuration.
         finished: Whether the node ended on purpose.
         health: What the node says of itself on `/diagnostics`.
-        incidents: What a person should know of; each also is a finding of the health.
+        incidents: What a person should know of; each is told on the topic `incidents`, logged, and
+            a finding of the health.
         declared: Its parameters, by name.
         prefixes: Prefixes below which it takes parameters of any name.
     """
@@ -114,7 +117,6 @@ class PatrolNode(Node):
         self.unusable = False
         self.finished = False
         self.health = Health()
-        self.incidents = Incidents(self._tell_incident)
         self.declared: dict[str, ParameterSpec] = {}
         self.prefixes: set[str] = set()
         self._on_change: dict[str, Callable[[Any], None]] = {}
@@ -140,6 +142,13 @@ class PatrolNode(Node):
         ]
         super().__init__(name, **node_options)
         self._logger = CleanLogger(self.get_logger().name)
+        self._incident_topic = IncidentPublisher(self)
+        self.incidents = Incidents(
+            self._tell_incident,
+            name,
+            self.get_namespace().rpartition('/')[2],
+            lambda: 1e-9 * self.get_clock().now().nanoseconds,
+        )
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
 
@@ -441,17 +450,18 @@ class PatrolNode(Node):
             self.get_logger().warn(f'{late} did not end in {JOIN_SECONDS} s')
         return not late
 
-    def _tell_incident(self, told: Told) -> None:
+    def _tell_incident(self, told: IncidentUpdate) -> None:
         subject, log = str(told.cause), self.get_logger()
         if told.over:
             self.health.clear(subject)
-            log.always(told.line(), LoggingSeverity.INFO)
+            log.always(told.words(), LoggingSeverity.INFO)
         elif told.severity is Severity.ALARM:
             self.health.error(subject, told.text)
-            log.always(told.line(), LoggingSeverity.ERROR)
+            log.always(told.words(), LoggingSeverity.ERROR)
         else:
             self.health.warn(subject, told.text)
-            log.always(told.line(), LoggingSeverity.WARN)
+            log.always(told.words(), LoggingSeverity.WARN)
+        self._incident_topic.tell(told, self.incidents)
 
     def _check_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         try:

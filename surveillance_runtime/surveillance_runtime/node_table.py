@@ -13,7 +13,7 @@ BEHAVIOURS = ('surveillance', 'patrol')
 DEFAULT_BEHAVIOUR = BEHAVIOURS[0]
 LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 CONSOLE = 'console'
-RECORDER, MARKERS = 'mission_recorder', 'mission_markers'
+RECORDER, MARKERS, ALARM = 'mission_recorder', 'mission_markers', 'alarm'
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ _PURPOSES = {
     },
     'surveillance_operator': {
         CONSOLE: 'one prompt for a mission: answers, doors, rooms, why, go',
+        ALARM: 'calls a person for what goes wrong, and keeps it in the log',
         'mission_view': 'shows a running mission in the terminal',
         'mission_markers': 'shows a running mission to RViz, Foxglove and rqt',
         'mission_page': 'shows a running mission in browsers',
@@ -125,7 +126,9 @@ RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE, EXPLORER))
 """The nodes of which a robot has one each."""
 
 
-SHARED = frozenset(('armor_server', 'ontology_map_builder', 'simulator', 'mission_page', CONSOLE))
+SHARED = frozenset(
+    ('armor_server', 'ontology_map_builder', 'simulator', 'mission_page', CONSOLE, ALARM)
+)
 """The nodes that a fleet has once; each robot has the others in its namespace."""
 _SHARED_NAMES = (
     *('armor_interface_srv', 'armor_interface_serialized_srv', 'fact_changes'),
@@ -136,7 +139,7 @@ _SHARED_NAMES = (
             *('add_room', 'remove_room', 'set_door', 'set_place'),
         )
     ),
-    *('map', 'door_states', 'place', 'fleet_robots'),
+    *('map', 'door_states', 'place', 'fleet_robots', 'incidents'),
     *(
         f'simulation/{name}'
         for name in ('set_door', 'place_obstacle', 'remove_obstacle', 'set_marker', 'stage')

@@ -92,6 +92,12 @@ OPTIONS = {
         RunOption(
             'remap', '', 'rename a topic, service or action of all nodes, as -r of ros2 run does'
         ),
+        RunOption(
+            'alarm', '', 'run this when the robot needs a person; the last argument says why'
+        ),
+        RunOption(
+            'notify', '', 'whom else to tell: webhooks, MQTT, e-mail, commands (notify.yaml)'
+        ),
         RunOption('record', '', 'folder for the files of runs'),
         RunOption(
             'watch',

@@ -22,7 +22,7 @@ from surveillance_runtime.configuration import (
     file_layer,
     resolved_text,
 )
-from surveillance_runtime.node_table import NODES, Node
+from surveillance_runtime.node_table import ALARM, NODES, Node
 from surveillance_runtime.profile import ProfileFile, profile_layer
 from surveillance_runtime.run_files import PLACE
 from surveillance_runtime.run_options import MUJOCO
@@ -129,6 +129,21 @@ def record_entries(record: Path) -> Iterator[Entry]:
     """Yield where the nodes that write the mission's record find it."""
     for node in (BEHAVIOUR_NODE, 'reasoner', 'initial_state'):
         yield for_node(node, 'record', str(record), 'this run')
+
+
+def alarm_entries(folder: Path, *, command: str, notify: Path | None) -> Iterator[Entry]:
+    """Yield what the node is told that calls people.
+
+    Args:
+        folder: Where the run writes.
+        command: Run when a person is needed; empty: none.
+        notify: Who else is told; None: nobody.
+    """
+    yield for_node(ALARM, 'folder', str(folder.resolve()), 'this run')
+    if command:
+        yield for_node(ALARM, 'command', command, '--alarm')
+    if notify is not None:
+        yield for_node(ALARM, 'notify_file', str(notify.absolute()), '--notify')
 
 
 def page_entries(

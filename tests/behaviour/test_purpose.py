@@ -6,13 +6,13 @@ from dataclasses import replace
 
 from surveillance_behaviour.mission.purpose import PATIENCE, PurposeWatch, Seen
 from surveillance_behaviour.mission.recovery import Failure
-from surveillance_runtime.incidents import Incidents, Severity, Told
+from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
 
 MOVING = Seen(0.0, 'MOVE_TO_NEXT_ROOM', pose=(1.0, 2.0, 0.0), level=80.0, place='C1')
 
 
-def watch(explained: float = 0.0) -> tuple[PurposeWatch, list[Told]]:
-    told: list[Told] = []
+def watch(explained: float = 0.0) -> tuple[PurposeWatch, list[IncidentUpdate]]:
+    told: list[IncidentUpdate] = []
     return PurposeWatch(Incidents(told.append), lambda _state: explained), told
 
 

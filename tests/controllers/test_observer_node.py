@@ -380,7 +380,7 @@ def test_pictures_without_a_pose_are_told_once_and_when_that_is_over(graph, monk
     for tick in range(-200, -29):
         eyes.carry(0.0, tick / 20)
     lines = []
-    monkeypatch.setattr(node.incidents, '_tell', lambda told: lines.append(told.line()))
+    monkeypatch.setattr(node.incidents, '_tell', lambda told: lines.append(told.words()))
 
     def look(first: int, driven: bool) -> None:
         nonlocal steady

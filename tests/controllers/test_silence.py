@@ -26,7 +26,7 @@ def stream(topic: str) -> Any:
 def test_a_silent_topic_is_named_once_until_it_speaks() -> None:
     lines: list[str] = []
     scan, odom = stream('/scan'), stream('/odom')
-    silence = SilenceWatch(Incidents(lambda told: lines.append(told.line())), (scan, odom))
+    silence = SilenceWatch(Incidents(lambda told: lines.append(told.words())), (scan, odom))
     # What never came is told elsewhere, once.
     silence.look(1000.0)
     assert not lines
@@ -51,7 +51,7 @@ def test_a_silent_topic_is_named_once_until_it_speaks() -> None:
 def test_what_comes_and_is_of_no_use_is_not_called_silence() -> None:
     lines: list[str] = []
     scan = stream('/scan')
-    silence = SilenceWatch(Incidents(lambda told: lines.append(told.line())), (scan,))
+    silence = SilenceWatch(Incidents(lambda told: lines.append(told.words())), (scan,))
     scan.heard_at, scan.came_at, scan.problem = 0.0, 9.9, 'the lidar is covered'
     silence.look(10.0)
     silence.look(30.0)

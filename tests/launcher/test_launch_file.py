@@ -27,7 +27,7 @@ from tests.launch_stand_ins import Argument, Configured
 from tests.launcher.conftest import ROOT
 
 SOURCE = ROOT / 'surveillance_behaviour' / 'launch' / 'surveillance.launch.py'
-PER_RUN = {'record', 'console', 'ontologies_folder', 'store', 'place', 'state_file'}
+PER_RUN = {'record', 'folder', 'console', 'ontologies_folder', 'store', 'place', 'state_file'}
 
 
 @dataclasses.dataclass
@@ -92,7 +92,7 @@ def settings(node: StartedNode) -> dict[str, object]:
 @pytest.mark.parametrize('mode', MODES)
 def test_it_starts_the_same_nodes_with_the_same_values(start, mode, behaviour):
     started = start(mode=mode, behaviour=behaviour)
-    wanted = (*select(mode, behaviour), find('mission_markers'))
+    wanted = (*select(mode, behaviour), find('alarm'), find('mission_markers'))
     assert [(n.package, n.executable) for n in started] == [(n.package, n.name) for n in wanted]
     merged = configuration(ROOT / 'config', Run(mode=mode, behaviour=behaviour))
     for node in started:
@@ -114,6 +114,14 @@ def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, 
     assert by_name['mission_recorder']['folder'] == str(tmp_path / 'it' / 'recording')
     assert 33 in [values.get('urgency_threshold') for values in by_name.values()]
     assert 'office.yaml' in Path(nodes[1].parameters[0]).read_text()
+
+
+def test_a_person_is_called_as_with_launch_py(start, tmp_path):
+    given = {'alarm': 'blink', 'notify': str(tmp_path / 'notify.yaml')}
+    nodes = {node.name: settings(node) for node in start(record=str(tmp_path / 'it'), **given)}
+    alarm = nodes['alarm']
+    assert (alarm['command'], alarm['notify_file']) == ('blink', given['notify'])
+    assert alarm['folder'] == str(tmp_path / 'it')
 
 
 def test_a_robot_that_watches_stays_as_long_as_with_launch_py(start, tmp_path):

@@ -126,11 +126,3 @@ def test_a_line_is_bounded_and_holds_no_control_characters():
     assert bounded('plain \x1b[31mred\x1b[0m') == 'plain \x1b[31mred\x1b[0m'
     assert bounded('a\x00b\x07c') == r'a\x00b\x07c'
     assert len(bounded('x' * 10**6)) < LONGEST_LINE + 60
-
-
-def test_each_line_of_a_node_is_told_to_whoever_listens():
-    heard = []
-    log = MergedLog(io.StringIO(), ['robot_behavior'])
-    log.listen(lambda *line: heard.append(line))
-    log.line('robot_behavior', '[ERROR] [robot_behavior] waiting for help: why')
-    assert heard == [('robot_behavior', 'waiting for help: why')]

@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-import io
 import json
 import os
 import shlex
 import subprocess
 import sys
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,11 +12,10 @@ from typing import Any
 import pytest
 import yaml
 
-from launcher.alarm import caller
 from launcher.cli import CONFIG
 from launcher.fleet_launch import RobotProcesses
-from launcher.log_merge import MergedLog
 from launcher.run import (
+    ALARM,
     MARKERS,
     PAGE,
     RECORDER,
@@ -39,7 +36,6 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime import discovery
 from surveillance_runtime.command_line import page_address
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.incidents import Call, Cause, Incident, Severity
 from surveillance_runtime.node_table import DEFAULT_MODE
 from surveillance_runtime.profile import read_profile
 from surveillance_runtime.run_files import TIMELINE
@@ -283,21 +279,6 @@ def test_the_last_lines_of_a_run_can_be_typed_and_tell_what_could_not_be_written
     assert what_to_look_at(tmp_path) == []
 
 
-def test_an_alarm_gets_one_line_as_its_last_argument(tmp_path):
-    out = tmp_path / 'said'
-    script = tmp_path / 'alarm.sh'
-    script.write_text(f'printf "%s|" "$@" > {out}.new; mv {out}.new {out}\n')
-    log = MergedLog(io.StringIO(), ['a'])
-    text = 'waiting for help: a door is closed'
-    incident = Incident('a', Cause('robot', 'help'), text, Severity.ALARM, 0.0)
-    caller(f'sh {script} first', log)(Call(text, incident, 1, over=False))
-    for _ in range(1200):
-        if out.exists():
-            break
-        threading.Event().wait(0.05)
-    assert out.read_text() == 'first|waiting for help: a door is closed|'
-
-
 @pytest.mark.parametrize('network', [False, True])
 def test_no_node_uses_shared_memory(monkeypatch, network):
     """What a killed process leaves there hides its successor: it answers nobody."""
@@ -356,7 +337,7 @@ def test_only_starts_what_is_named_and_may_be_repeated():
     run = wanted_run(options)
     assert {node.name for node in run.nodes()} == {'planner_controller', 'armor_server'}
     assert run.observers() == ()
-    assert [node.name for node in Run(record=None).observers()] == [RECORDER, MARKERS]
+    assert [node.name for node in Run(record=None).observers()] == [ALARM, RECORDER, MARKERS]
     assert [node.name for node in replace(run, web=True).observers()] == [PAGE]
     assert [node.name for node in replace(run, web_address=':80').observers()] == [PAGE]
 

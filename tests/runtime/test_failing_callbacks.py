@@ -18,13 +18,12 @@ from state_machines.ros.waiting import CLIENT_QOS
 from surveillance_runtime.logging import (
     LINES_AT_ONCE,
     LINES_PER_SECOND,
-    LONGEST,
     WARNINGS_AT_ONCE,
     WARNINGS_PER_SECOND,
     Allowance,
-    clean,
 )
 from surveillance_runtime.node import MOST_WAITING, PatrolNode
+from surveillance_runtime.one_line import LONGEST, clean
 from surveillance_runtime.waiting import AwaitedEvent
 
 

@@ -5,21 +5,36 @@ from __future__ import annotations
 import pytest
 
 from surveillance_runtime.incidents import (
+    FIRST_AGAIN,
+    MOST_OPEN,
     SETTLED,
+    TOLD_AGAIN,
     Cause,
     Incident,
     IncidentBook,
+    IncidentPhase,
     Incidents,
+    IncidentUpdate,
+    SeenThing,
     Severity,
-    Told,
-    read_line,
 )
+
+pytestmark = pytest.mark.unit
 
 D1 = Cause('door', 'D1')
 
 
-def alarm(cause: Cause = D1, text: str = 'D1 is closed', *, over: bool = False) -> Told:
-    return Told(cause, Severity.ALARM, text, over)
+def alarm(
+    cause: Cause = D1,
+    text: str = 'D1 is closed',
+    *,
+    over: bool = False,
+    node: str = 'robot_behavior',
+    severity: Severity = Severity.ALARM,
+    **more: str,
+) -> IncidentUpdate:
+    phase = IncidentPhase.END if over else IncidentPhase.BEGIN
+    return IncidentUpdate(phase, cause, severity, text, node=node, **more)
 
 
 def book() -> tuple[IncidentBook, list[str], list[Incident]]:
@@ -33,9 +48,9 @@ def test_an_hour_long_incident_calls_five_times_and_once_that_all_is_well() -> N
     for minute in range(61):
         now = 60.0 * minute
         # The robot says it again with each try.
-        incidents.hear('robot_behavior', alarm(), now)
+        incidents.hear(alarm(), now)
         incidents.advance(now + 30.0)
-    incidents.hear('robot_behavior', alarm(over=True), 3660.0)
+    incidents.hear(alarm(over=True), 3660.0)
     incidents.advance(3660.0 + SETTLED)
     assert len(calls) == 6
     assert calls[0] == 'D1 is closed'
@@ -47,15 +62,15 @@ def test_an_hour_long_incident_calls_five_times_and_once_that_all_is_well() -> N
 def test_an_incident_that_comes_and_goes_is_one() -> None:
     incidents, calls, notes = book()
     for step in range(50):
-        incidents.hear('planner', alarm(over=bool(step % 2)), step * 1.0)
+        incidents.hear(alarm(over=bool(step % 2)), step * 1.0)
     assert calls == ['D1 is closed']
     assert len(notes) == 1
 
 
 def test_nobody_is_called_for_a_warning_nor_told_that_it_is_over() -> None:
     incidents, calls, notes = book()
-    incidents.hear('n', Told(D1, Severity.WARNING, 'odd', over=False), 0.0)
-    incidents.hear('n', Told(D1, Severity.WARNING, 'odd', over=True), 1.0)
+    incidents.hear(alarm(text='odd', severity=Severity.WARNING), 0.0)
+    incidents.hear(alarm(text='odd', severity=Severity.WARNING, over=True), 1.0)
     incidents.advance(100.0)
     assert not calls
     assert len(notes) == 2
@@ -64,10 +79,10 @@ def test_nobody_is_called_for_a_warning_nor_told_that_it_is_over() -> None:
 def test_who_waits_for_a_cause_that_is_told_is_no_second_call() -> None:
     incidents, calls, _ = book()
     scan = Cause('topic', 'scan')
-    incidents.hear('motion_controller', alarm(scan, 'nothing is published on scan'), 0.0)
-    incidents.hear('robot_behavior', alarm(Cause('robot', 'help'), 'waits for help'), 2.0)
+    incidents.hear(alarm(scan, 'nothing is published on scan', node='m'), 0.0)
+    incidents.hear(alarm(Cause('robot', 'help'), 'waits for help'), 2.0)
     assert calls == ['nothing is published on scan']
-    incidents.hear('motion_controller', alarm(scan, '', over=True), 10.0)
+    incidents.hear(alarm(scan, '', over=True, node='m'), 10.0)
     incidents.advance(10.0 + SETTLED)
     assert calls[1].startswith('all clear')
     assert calls[2:] == ['waits for help']
@@ -75,29 +90,103 @@ def test_who_waits_for_a_cause_that_is_told_is_no_second_call() -> None:
 
 def test_what_a_node_told_ends_after_its_restart_unless_it_tells_it_again() -> None:
     incidents, calls, _ = book()
-    incidents.hear('a', alarm(), 0.0)
+    incidents.hear(alarm(node='a'), 0.0)
     incidents.restarted('a', 10.0)
     incidents.advance(200.0)
     assert calls[-1].endswith('a was started again')
 
 
-def test_a_line_of_the_log_carries_all() -> None:
-    lines: list[str] = []
-    incidents = Incidents(lambda told: lines.append(told.line()))
-    incidents.begin(('topic', 'battery_level'), 'two publishers', Severity.ALARM)
-    incidents.begin(('topic', 'battery_level'), 'two publishers', Severity.ALARM)
-    incidents.end(('topic', 'battery_level'), 'one is left')
-    incidents.end(('topic', 'battery_level'))
-    assert lines == [
+def test_an_owner_tells_of_a_beginning_each_change_and_the_end_once() -> None:
+    told: list[IncidentUpdate] = []
+    incidents = Incidents(told.append, 'battery_controller', 'anna', lambda: 7.0)
+    cause = ('topic', 'battery_level')
+    incidents.begin(cause, 'two publishers', Severity.ALARM, place='E')
+    incidents.begin(cause, 'two publishers', Severity.ALARM, place='E')
+    incidents.begin(cause, 'three publishers', Severity.ALARM)
+    incidents.end(cause, 'one is left')
+    incidents.end(cause)
+    assert [each.words() for each in told] == [
         'incident [topic battery_level, alarm]: two publishers',
+        'incident [topic battery_level, alarm]: three publishers',
         'incident [topic battery_level, over]: one is left',
     ]
-    begun, ended = map(read_line, lines)
-    assert begun == Told(Cause('topic', 'battery_level'), Severity.ALARM, 'two publishers', False)
-    assert ended is not None
-    assert ended.over
+    assert [each.phase for each in told] == [
+        IncidentPhase.BEGIN,
+        IncidentPhase.UPDATE,
+        IncidentPhase.END,
+    ]
+    assert len({each.id for each in told}) == 1
+    assert {(each.owner, each.since, each.place) for each in told} == {
+        ('anna/battery_controller', 7.0, 'E')
+    }
 
 
-@pytest.mark.parametrize('line', ['', 'incident', 'x incident [a b, alarm]: y', 'battery low'])
+def test_a_line_for_the_alarm_carries_all() -> None:
+    seen = SeenThing(3, 'door', 'ajar', 'D1', (1.0, 2.0), 0.9, 'D1 is shut at night')
+    told = IncidentUpdate(
+        *(
+            IncidentPhase.BEGIN,
+            D1,
+            Severity.ALARM,
+            'D1 is ajar',
+            'a1',
+            5.0,
+            'anna',
+            'observer',
+            'C1',
+        ),
+        action='shut it',
+        evidence=('3_1_a.jpg',),
+        finding=seen,
+    )
+    assert IncidentUpdate.from_line(told.to_line()) == told
+
+
+@pytest.mark.parametrize('line', ['', '[]', '{}', '{"cause": 3}', 'incident [door D1]: x'])
 def test_other_lines_are_no_incidents(line: str) -> None:
-    assert read_line(line) is None
+    with pytest.raises(ValueError, match='xpect'):
+        IncidentUpdate.from_line(line)
+
+
+def test_who_takes_care_is_not_called_again_and_told_when_it_is_over() -> None:
+    incidents, calls, _ = book()
+    incidents.hear(alarm(), 0.0)
+    incidents.hear(alarm(acknowledged_by='a person'), 10.0)
+    incidents.advance(10.0 + 2 * FIRST_AGAIN)
+    assert calls == ['D1 is closed']
+    incidents.hear(alarm(over=True), 1000.0)
+    incidents.advance(1000.0 + SETTLED)
+    assert calls[1:] == ['all clear after 17 min: D1 is closed']
+
+
+def test_what_is_over_is_told_at_the_end_of_the_run() -> None:
+    incidents, calls, notes = book()
+    incidents.hear(alarm(), 0.0)
+    incidents.hear(alarm(over=True), 30.0)
+    incidents.close(32.0)
+    assert calls == ['D1 is closed', 'all clear after 30 s: D1 is closed']
+    assert notes[-1].ended == 30.0
+
+
+def test_an_incident_of_before_a_restart_is_not_called_twice_and_ends() -> None:
+    incidents, calls, notes = book()
+    incidents.restore(alarm(), 0.0, calls=1, called=0.0, now=100.0)
+    incidents.hear(alarm(), 101.0)
+    incidents.advance(FIRST_AGAIN - 1.0)
+    assert not calls
+    assert not notes
+    incidents.advance(FIRST_AGAIN)
+    assert calls == ['D1 is closed (for 4 min now)']
+    other, calls, _ = book()
+    other.restore(alarm(), 0.0, calls=1, called=0.0, now=100.0)
+    other.advance(100.0 + TOLD_AGAIN)
+    assert len(calls) == 1
+    assert calls[0].startswith('all clear')
+
+
+def test_causes_without_end_are_bounded() -> None:
+    incidents, _, _ = book()
+    for number in range(MOST_OPEN + 10):
+        told = alarm(Cause('robot', str(number)), severity=Severity.WARNING)
+        incidents.hear(told, 0.0)
+    assert len(incidents.open()) == MOST_OPEN

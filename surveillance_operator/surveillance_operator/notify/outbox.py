@@ -1,7 +1,9 @@
-"""The outbox: news that wait on the disk until each sink has taken them.
+"""The outbox: notifications that wait on the disk until each sink has taken them.
 
 A sink that cannot be reached is tried again after 1, 2, 4 ... seconds, at most every five minutes,
-for a day. What waits outlives the process; what was handed in before is not handed in again.
+for a day. What one sink can never take, as its text cannot be written in a mail, is put aside and
+told of; what it does not take now lets the next one pass. What waits outlives the process; what was
+handed in before is not handed in again.
 """
 
 from __future__ import annotations
@@ -15,23 +17,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from surveillance_operator.notify.news import News
+from surveillance_operator.notify.notification import Notification
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 300.0
 """Between two tries, seconds; the wait doubles."""
 GIVEN_UP_AFTER = 86400.0
-"""News that no try could deliver for this long are dropped, seconds."""
+"""Notification that no try could deliver for this long is dropped, seconds."""
+TROUBLE_AFTER = 300.0
+"""A sink that has not worked for so long is told of on the others, seconds."""
 MOST_WAITING = 1000
-"""So many news wait for a sink; the oldest goes first."""
+"""So many notifications wait for a sink; the oldest goes first."""
 REMEMBERED = 2000
-"""So many keys of news that were handed in are remembered."""
+"""So many keys of notifications that were handed in are remembered."""
 
-Deliver = Callable[[News], None]
-"""Hands news to a sink; raises `DeliveryError` when it did not take them."""
+Deliver = Callable[[Notification], None]
+"""Hands a notification to a sink; raises `DeliveryError` when it did not take it."""
 
 
 class DeliveryError(Exception):
-    """A sink did not take the news; one line without secrets.
+    """A sink did not take a notification; one line without secrets.
 
     Args:
         problem: What was wrong.
@@ -44,8 +48,8 @@ class DeliveryError(Exception):
 
 
 @dataclass
-class _Waiting:
-    news: News
+class _Pending:
+    notification: Notification
     path: Path
     tries: int = 0
     next_try: float = 0.0
@@ -56,18 +60,38 @@ class _Queue:
 
     def __init__(self, name: str, deliver: Deliver, folder: Path) -> None:
         self.name, self.deliver, self.folder = name, deliver, folder
-        self.waiting: deque[_Waiting] = deque()
-        self.failing = False
+        self.waiting: deque[_Pending] = deque()
+        # Since when it does not work, by how many tries in a row, and until when it is left alone.
+        self.failing_since: float | None = None
+        self.failures = 0
+        self.rests_until = 0.0
+        self.is_told = False
+
+    def is_done(self) -> bool:
+        """Tell whether another moment's wait would help none."""
+        return not self.waiting or self.failing_since is not None
+
+    def due(self, now: float) -> _Pending | None:
+        """Return what is to be tried now; None: nothing is."""
+        if now < self.rests_until:
+            return None
+        return next((each for each in self.waiting if each.next_try <= now), None)
+
+    def next_due(self) -> float | None:
+        """Return when something is to be tried; None: nothing waits."""
+        first = min((each.next_try for each in self.waiting), default=None)
+        return None if first is None else max(first, self.rests_until)
 
 
 class Outbox:
-    """Hands news to sinks, on a thread for each.
+    """Hands notifications to sinks, on a thread for each.
 
     Args:
         folder: Where what waits is kept; made when missing.
         sinks: By name.
         report: Takes a line about a sink that fails, and that works again.
         now: Seconds since 1970.
+        trouble: Takes the name of a sink that a person should look at, and why; empty: it works.
 
     Raises:
         OSError: The folder cannot be made or read.
@@ -79,8 +103,10 @@ class Outbox:
         sinks: Mapping[str, Deliver],
         report: Callable[[str], object] = lambda _: None,
         now: Callable[[], float] = time.time,
+        trouble: Callable[[str, str], object] = lambda _sink, _text: None,
     ) -> None:
         self._folder, self._report, self._now = folder, report, now
+        self._trouble = trouble
         self._changed = threading.Condition()
         self._ended = False
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -100,17 +126,17 @@ class Outbox:
         for thread in self._threads:
             thread.start()
 
-    def put(self, news: News) -> bool:
-        """Take news for all sinks; return whether they are new. Never waits for a sink."""
+    def put(self, notification: Notification) -> bool:
+        """Take one for all sinks; return whether it is new. Never waits for a sink."""
         with self._changed:
-            if news.key in self._known:
+            if notification.key in self._known:
                 return False
-            self._known.append(news.key)
+            self._known.append(notification.key)
             for queue in self._queues:
                 self._number += 1
                 path = queue.folder / f'{self._now():017.6f}_{self._number:06d}.json'
-                _write(path, news.kept(), self._report)
-                queue.waiting.append(_Waiting(news, path))
+                _write(path, notification.kept(), self._report)
+                queue.waiting.append(_Pending(notification, path))
                 while len(queue.waiting) > MOST_WAITING:
                     oldest = queue.waiting.popleft()
                     oldest.path.unlink(missing_ok=True)
@@ -120,7 +146,7 @@ class Outbox:
         return True
 
     def waiting(self) -> dict[str, int]:
-        """Return how many news wait for each sink."""
+        """Return how many wait for each sink."""
         with self._changed:
             return {each.name: len(each.waiting) for each in self._queues}
 
@@ -133,7 +159,8 @@ class Outbox:
         until = time.monotonic() + patience
         with self._changed:
             self._changed.wait_for(
-                lambda: all(not each.waiting or each.failing for each in self._queues), patience
+                lambda: all(not q.waiting or q.failing_since is not None for q in self._queues),
+                patience,
             )
             self._ended = True
             self._changed.notify_all()
@@ -146,41 +173,67 @@ class Outbox:
         queue = next(each for each in self._queues if each.name == name)
         while True:
             with self._changed:
-                if not queue.waiting:
-                    return None
-                first = queue.waiting[0]
-                if first.next_try > self._now():
-                    return first.next_try
-            self._try(queue, first)
+                each = queue.due(self._now())
+                if each is None:
+                    return queue.next_due()
+            self._try(queue, each)
 
-    def _try(self, queue: _Queue, first: _Waiting) -> None:
+    def _try(self, queue: _Queue, each: _Pending) -> None:
         problem: DeliveryError | None = None
         try:
-            queue.deliver(first.news)
+            queue.deliver(each.notification)
         except DeliveryError as error:
             problem = error
+        except (ValueError, TypeError) as error:
+            # What it holds cannot be written in the sink's form, today or tomorrow.
+            problem = DeliveryError(f'{type(error).__name__}: {error!s:.100}', final=True)
         except Exception as error:
-            # A sink's fault must not end the others' thread, nor lose the news.
+            # A sink's fault must not end the others' thread, nor lose what waits.
             problem = DeliveryError(type(error).__name__)
+        trouble: str | None = None
         with self._changed:
             if problem is None:
-                if queue.failing:
-                    self._report(f'{queue.name}: works again')
-                queue.failing = False
-                self._drop(queue, first)
-            elif problem.final or self._now() - first.news.at > GIVEN_UP_AFTER:
-                self._report(f'{queue.name}: {problem}; not told: {first.news.text}')
-                self._drop(queue, first)
+                trouble = self._taken(queue, each)
+            elif problem.final or self._now() - each.notification.at > GIVEN_UP_AFTER:
+                trouble = f'{problem}; not told: {each.notification.text}'
+                self._report(f'{queue.name}: {trouble}')
+                queue.is_told = True
+                self._drop(queue, each)
             else:
-                if not queue.failing:
-                    self._report(f'{queue.name}: {problem}; it is tried again')
-                queue.failing = True
-                wait = min(FIRST_WAIT * 2.0**first.tries, LONGEST_WAIT)
-                first.tries += 1
-                first.next_try = self._now() + wait
+                trouble = self._failed(queue, each, problem)
             self._changed.notify_all()
+        if trouble is not None:
+            self._trouble(queue.name, trouble)
 
-    def _drop(self, queue: _Queue, each: _Waiting) -> None:
+    def _taken(self, queue: _Queue, each: _Pending) -> str | None:
+        """Note that a sink works; return the end of its trouble, None: it had none."""
+        if queue.failing_since is not None:
+            self._report(f'{queue.name}: works again')
+        queue.failing_since, queue.failures, queue.rests_until = None, 0, 0.0
+        self._drop(queue, each)
+        was_told, queue.is_told = queue.is_told, False
+        return '' if was_told else None
+
+    def _failed(self, queue: _Queue, each: _Pending, problem: DeliveryError) -> str | None:
+        """Note that a sink took one not now; return its trouble when that is to be told."""
+        now = self._now()
+        if queue.failing_since is None:
+            queue.failing_since = now
+            self._report(f'{queue.name}: {problem}; it is tried again')
+        wait = min(FIRST_WAIT * 2.0**each.tries, LONGEST_WAIT)
+        each.tries += 1
+        each.next_try = now + wait
+        queue.failures += 1
+        if queue.failures > 1:
+            # It was not that one's: the others wait, too.
+            rest = min(FIRST_WAIT * 2.0 ** (queue.failures - 2), LONGEST_WAIT)
+            queue.rests_until = now + rest
+        if now - queue.failing_since < TROUBLE_AFTER or queue.is_told:
+            return None
+        queue.is_told = True
+        return f'{problem} for {now - queue.failing_since:.0f} s; {len(queue.waiting)} wait'
+
+    def _drop(self, queue: _Queue, each: _Pending) -> None:
         if each in queue.waiting:
             queue.waiting.remove(each)
         each.path.unlink(missing_ok=True)
@@ -201,11 +254,11 @@ class Outbox:
     def _read(self, queue: _Queue) -> None:
         for path in sorted(queue.folder.glob('*.json')):
             try:
-                news = News.from_kept(path.read_text('utf-8'))
+                notification = Notification.from_kept(path.read_text('utf-8'))
             except (OSError, ValueError, KeyError, TypeError):
                 path.unlink(missing_ok=True)  # cut off by a crash
                 continue
-            queue.waiting.append(_Waiting(news, path))
+            queue.waiting.append(_Pending(notification, path))
 
 
 def _keys(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""People are told by webhook, MQTT, e-mail and command: against real servers on the loopback."""
+"""People are told by webhook, MQTT, e-mail and command: against real servers."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ import os
 import shutil
 import subprocess
 import threading
-import time
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -19,58 +17,12 @@ import cv2
 import numpy as np
 import pytest
 
-from launcher.alarm import Alarm
 from strict_files.files import FileError
 from surveillance_operator.notify import sinks
-from surveillance_operator.notify.news import News, news_of
-from surveillance_operator.notify.outbox import DeliveryError, Outbox
-from surveillance_operator.notify.pipeline import notifier
-from surveillance_operator.notify.settings import read_notify_file, sink_from
-from surveillance_operator.notify.sinks import sink_of
-from surveillance_runtime.incidents import Call, Cause, Incident, Severity
+from surveillance_operator.notify.outbox import DeliveryError
+from surveillance_operator.notify.sinks import SINKS, read_notify_file, sink_from, sink_of
+from tests.operator.notify_peers import SECRET, Hook, evidence, news
 from tests.operator.ports import await_listening, free_port
-
-SECRET = 'hunter2hunter2'
-
-
-def news(key: str = 'k1', **fields: Any) -> News:
-    values = {
-        'text': '3: door D1 is ajar in C1',
-        'kind': 'event',
-        'name': '3',
-        'node': 'observer',
-        'robot': 'Robot1',
-        'over': False,
-        'at': 1000.0,
-    }
-    return News(key, **{**values, **fields})
-
-
-class Hook:
-    """A webhook's other end: keeps what is posted, answers what it is told to."""
-
-    def __init__(self) -> None:
-        self.posts: list[tuple[dict[str, str], dict[str, Any]]] = []
-        self.answers: list[int] = []
-        outer = self
-
-        class Handler(BaseHTTPRequestHandler):
-            def do_POST(self) -> None:
-                body = self.rfile.read(int(self.headers['Content-Length']))
-                outer.posts.append((dict(self.headers), json.loads(body)))
-                status = outer.answers.pop(0) if outer.answers else 204
-                self.send_response(status)
-                if status == 302:
-                    self.send_header('Location', f'{outer.address}/elsewhere')
-                self.send_header('Content-Length', '0')
-                self.end_headers()
-
-            def log_message(self, *_: Any) -> None:
-                pass
-
-        self.server = ThreadingHTTPServer(('127.0.0.1', 0), Handler)
-        self.address = f'http://127.0.0.1:{self.server.server_port}'
-        threading.Thread(target=self.server.serve_forever, args=(0.01,), daemon=True).start()
 
 
 @pytest.fixture
@@ -79,13 +31,6 @@ def hook() -> Iterator[Hook]:
     yield server
     server.server.shutdown()
     server.server.server_close()
-
-
-def evidence(folder: Path, name: str) -> Path:
-    picture = np.random.default_rng(0).integers(0, 255, (120, 160, 3)).astype(np.uint8)
-    path = folder / name
-    cv2.imwrite(str(path), picture)
-    return path
 
 
 def test_a_webhook_gets_json_with_a_token_and_pictures(
@@ -278,119 +223,47 @@ def test_a_command_gets_the_line_and_the_json(tmp_path: Path) -> None:
     assert json.loads((tmp_path / 'json').read_text())['key'] == 'k1'
 
 
-# --- the outbox ---
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 1000.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-class Sink:
-    def __init__(self) -> None:
-        self.taken: list[str] = []
-        self.problems: list[DeliveryError] = []
-
-    def __call__(self, each: News) -> None:
-        if self.problems:
-            raise self.problems.pop(0)
-        self.taken.append(each.key)
-
-
-def test_what_fails_is_tried_again_at_growing_distances_in_order(tmp_path: Path) -> None:
-    clock, sink, said = Clock(), Sink(), []
-    sink.problems = [DeliveryError('no answer in time') for _ in range(5)]
-    outbox = Outbox(tmp_path, {'a': sink}, said.append, clock)
-    outbox.put(news('k1'))
-    outbox.put(news('k2'))
-    waits = []
-    while (due := outbox.deliver_due('a')) is not None:
-        waits.append(due - clock.now)
-        clock.now = due
-    assert waits == [1.0, 2.0, 4.0, 8.0, 16.0]
-    assert sink.taken == ['k1', 'k2']
-    assert said == ['a: no answer in time; it is tried again', 'a: works again']
-    assert outbox.waiting() == {'a': 0}
-
-
-def test_nothing_is_lost_or_told_twice_over_a_restart(tmp_path: Path) -> None:
-    clock, away, there = Clock(), Sink(), Sink()
-    away.problems = [DeliveryError('refused')]
-    first = Outbox(tmp_path, {'away': away, 'there': there}, now=clock)
-    first.put(news('k1'))
-    first.put(news('k2'))
-    first.deliver_due('away')
-    first.deliver_due('there')
-    assert (away.taken, there.taken) == ([], ['k1', 'k2'])
-    (tmp_path / 'away' / '0.json').write_text('{"cut o')  # a crash in the middle of writing
-    again = Outbox(tmp_path, {'away': away, 'there': there}, now=clock)
-    assert not again.put(news('k1'))
-    assert again.put(news('k3'))
-    again.deliver_due('away')
-    again.deliver_due('there')
-    assert (away.taken, there.taken) == (['k1', 'k2', 'k3'], ['k1', 'k2', 'k3'])
-
-
-def test_one_sink_that_hangs_does_not_hold_up_another(tmp_path: Path) -> None:
-    hang, told = threading.Event(), threading.Event()
-
-    def slow(_: News) -> None:
-        hang.wait(60.0)
-
-    outbox = Outbox(tmp_path, {'slow': slow, 'quick': lambda _: told.set()})
-    outbox.start()
-    outbox.put(news(at=time.time()))
-    assert told.wait(60.0)
-    assert outbox.waiting()['slow'] == 1
-    hang.set()
-    outbox.close()
-
-
-def test_what_cannot_be_delivered_is_dropped_with_a_line_and_the_queue_is_bounded(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize('poison', ['a\nb', 'a\u2028b', 'a\ud800b'])
+def test_a_text_that_no_mail_can_hold_goes_out_in_one_line(
+    poison: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr('surveillance_operator.notify.outbox.MOST_WAITING', 3)
-    clock, sink, said = Clock(), Sink(), []
-    sink.problems = [DeliveryError('answered 400', final=True)]
-    outbox = Outbox(tmp_path, {'a': sink}, said.append, clock)
-    for number in range(5):
-        outbox.put(news(f'k{number}'))
-    outbox.deliver_due('a')
-    assert sink.taken == ['k3', 'k4']
-    assert said[-1] == 'a: answered 400; not told: 3: door D1 is ajar in C1'
-    sink.problems = [DeliveryError('away')] * 2
-    outbox.put(news('old'))
-    outbox.deliver_due('a')
-    clock.now += 2 * 86400.0
-    outbox.deliver_due('a')
-    assert said[-1].startswith('a: away; not told')
+    sent: list[Any] = []
+
+    class Server:
+        def __init__(self, *_: Any, **__: Any) -> None:
+            pass
+
+        def __enter__(self) -> Server:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def ehlo(self) -> None:
+            pass
+
+        def has_extn(self, _: str) -> bool:
+            return False
+
+        def send_message(self, message: Any) -> None:
+            sent.append(bytes(message))
+
+    monkeypatch.setattr(sinks.smtplib, 'SMTP', Server)
+    entry = {'email': 'a@example.org', 'from': 'r@example.org', 'smtp': 'smtp://localhost'}
+    sink_of(sink_from('a', entry))(news(name=poison, text=poison, robot=poison))
+    (message,) = sent
+    assert message.count(b'Subject:') == 1
 
 
-def test_news_of_an_event_have_its_pictures_and_one_key_for_one_call(tmp_path: Path) -> None:
-    event = {'place': 'C1', 'evidence': ['3_1_a.jpg', '../3_2_b.jpg']}
-    (tmp_path / 'event_3.json').write_text(json.dumps(event))
-    incident = Incident('observer', Cause('event', '3'), 'door', Severity.ALARM, 10.0)
-    call = Call('door', incident, 1, over=False)
-    told = news_of(call, 'Robot1', 1000.0, tmp_path)
-    assert told.event == event
-    assert told.pictures == (str(tmp_path / '3_1_a.jpg'), str(tmp_path / '3_2_b.jpg'))
-    assert told.key == news_of(call, 'Robot1', 1200.0, tmp_path).key
-    assert told.key != news_of(call._replace(number=2), 'Robot1', 1000.0, tmp_path).key
-    assert News.from_kept(told.kept()) == told
+# --- the file ---
 
 
-def test_an_incident_of_a_node_arrives_at_a_webhook(hook: Hook, tmp_path: Path) -> None:
-    (tmp_path / 'notify.yaml').write_text(f'sinks:\n  office: {{webhook: "{hook.address}"}}\n')
-    outbox, tell = notifier(tmp_path / 'notify.yaml', tmp_path, 'Robot1', lambda _: None)
-    alarm = Alarm(tell, tmp_path)
-    alarm.hear('observer', 'incident [event 3, alarm]: 3: door D1 is ajar in C1')
-    outbox.close(patience=10.0)
-    alarm.close()
-    ((_, body),) = hook.posts
-    assert (body['kind'], body['name'], body['text']) == ('event', '3', '3: door D1 is ajar in C1')
+@pytest.mark.parametrize('kind', SINKS)
+def test_each_kind_of_sink_is_in_the_documents(kind: str) -> None:
+    """A new kind is an entry of the table, and a row of the page that users read."""
+    text = (Path(__file__).parents[2] / 'docs' / 'watching.md').read_text('utf-8')
+    assert f'| {kind} |' in text
+    assert all(key in text for key in SINKS[kind].keys if not key.endswith(('_env', '_file')))
 
 
 # --- the file ---

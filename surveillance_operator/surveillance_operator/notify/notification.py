@@ -1,4 +1,4 @@
-"""News: one call for an incident, as it goes to people and programs."""
+"""A notification: one call for an incident, as it goes to people and programs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from surveillance_runtime.incidents import Call
+from surveillance_runtime.incidents import IncidentCall, IncidentUpdate
+from surveillance_runtime.one_line import clean
 
 
 @dataclass(frozen=True)
-class News:
+class Notification:
     """One call for an incident.
 
     Attributes:
@@ -25,8 +26,10 @@ class News:
         robot: Whose mission it is.
         over: Whether it is over.
         at: When, seconds since 1970.
-        event: Of the observer, as `Event.to_json`; empty where it is none.
+        event: What the observer saw: number, kind, seen, subject, place, position, rule; empty
+            where it is of something else.
         pictures: Files that show it, the first and the last sighting.
+        action: What a person is to do; empty: nobody knows.
     """
 
     key: str
@@ -39,12 +42,13 @@ class News:
     at: float
     event: Mapping[str, Any] = field(default_factory=dict)
     pictures: tuple[str, ...] = ()
+    action: str = ''
 
     @property
     def subject(self) -> str:
         """Return a short line."""
         word = 'all clear' if self.over else 'alarm'
-        return f'{self.robot}: {word}: {self.kind} {self.name}'
+        return clean(f'{self.robot}: {word}: {self.kind} {self.name}')
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain values, with the names of pictures but not where they lie."""
@@ -58,6 +62,7 @@ class News:
             'over': self.over,
             'at': round(self.at, 3),
             **({'event': dict(self.event)} if self.event else {}),
+            **({'action': self.action} if self.action else {}),
         }
 
     def kept(self) -> str:
@@ -65,7 +70,7 @@ class News:
         return json.dumps({**self.to_json(), 'pictures': list(self.pictures)})
 
     @classmethod
-    def from_kept(cls, text: str) -> News:
+    def from_kept(cls, text: str) -> Notification:
         """Return what `kept` gave.
 
         Raises:
@@ -76,8 +81,10 @@ class News:
         return cls(**values)
 
 
-def news_of(call: Call, robot: str, at: float, evidence: Path | None = None) -> News:
-    """Return the news of a call.
+def notification_of(
+    call: IncidentCall, robot: str, at: float, evidence: Path | None = None
+) -> Notification:
+    """Return the notification of a call.
 
     Args:
         call: What the book of incidents says.
@@ -85,36 +92,44 @@ def news_of(call: Call, robot: str, at: float, evidence: Path | None = None) -> 
         at: Now, seconds since 1970.
         evidence: The observer's folder of pictures; None: there is none.
     """
-    incident = call.incident
-    event = _event(evidence, incident.cause.name) if incident.cause.kind == 'event' else {}
+    told = call.incident.told
     pictures: tuple[str, ...] = ()
     if evidence is not None:
-        pictures = tuple(str(evidence / Path(str(name)).name) for name in event.get('evidence', ()))
-    named = incident.node, *incident.cause, incident.text, str(call.number), str(call.over)
-    # Of the same hour: a launcher that is started again tells of what it finds again.
+        pictures = tuple(str(evidence / Path(name).name) for name in told.evidence)
+    named = told.node, *told.cause, told.text, str(call.number), str(call.over)
+    # Of the same hour: what is started again tells of what it finds again.
     key = hashlib.sha256('\n'.join((robot, *named, f'{at // 3600:.0f}')).encode()).hexdigest()[:24]
-    return News(
+    return Notification(
         key,
         call.text,
-        incident.cause.kind,
-        incident.cause.name,
-        incident.node,
+        told.cause.kind,
+        told.cause.name,
+        told.node,
         robot,
         call.over,
         at,
-        event,
+        _event(told),
         pictures,
+        told.action,
     )
 
 
-def _event(evidence: Path | None, number: str) -> dict[str, Any]:
-    if evidence is None or not number.isdigit():
+def _event(told: IncidentUpdate) -> dict[str, Any]:
+    """Return what the observer saw, as sinks tell it; empty where it is of something else."""
+    seen = told.finding
+    if seen is None:
         return {}
-    try:
-        event = json.loads((evidence / f'event_{number}.json').read_text('utf-8'))
-    except (OSError, ValueError):
-        return {}  # the alarm counts without it
-    return event if isinstance(event, dict) else {}
+    return {
+        'number': seen.number,
+        'kind': seen.kind,
+        'seen': seen.seen,
+        'subject': seen.subject,
+        'place': told.place,
+        'position': None if seen.position is None else list(seen.position),
+        'confidence': seen.confidence,
+        'rule': seen.rule,
+        'evidence': list(told.evidence),
+    }
 
 
 def as_base64(picture: bytes) -> str:

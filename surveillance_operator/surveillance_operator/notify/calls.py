@@ -1,0 +1,79 @@
+"""How a person is called: a line of the log, the user's command, and the sinks of `notify.yaml`."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from surveillance_operator.notify.notification import notification_of
+from surveillance_operator.notify.outbox import Outbox
+from surveillance_operator.notify.sinks import read_notify_file, sink_of
+from surveillance_runtime.incidents import IncidentCall
+
+OUTBOX, EVIDENCE = 'outbox', 'evidence'
+"""Folders of a run."""
+
+
+def run_command(command: str, text: str) -> str:
+    """Run the user's command with one line as its last argument; return why not, empty: it runs."""
+    try:
+        subprocess.Popen(
+            [*shlex.split(command), text],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    except (OSError, ValueError) as error:
+        return f'--alarm {command}: {error}'
+    return ''
+
+
+class Sinks(NamedTuple):
+    """The sinks of a run.
+
+    Attributes:
+        outbox: What waits for them.
+        tell: Hands a call to them.
+    """
+
+    outbox: Outbox
+    tell: Callable[[IncidentCall], object]
+
+
+def open_sinks(
+    file: Path,
+    folder: Path,
+    robot: str,
+    report: Callable[[str], object],
+    trouble: Callable[[str, str], object] = lambda _sink, _text: None,
+) -> Sinks:
+    """Return the sinks of a file, which begin to be told of what waits.
+
+    Args:
+        file: The sinks, notify.yaml.
+        folder: Of the run.
+        robot: Its name, where an incident is of no robot of a fleet.
+        report: Takes a line about a sink that does not work, and that works again.
+        trouble: Takes the name of a sink that a person should look at, and why; empty: it works.
+
+    Raises:
+        FileError: The file cannot be used.
+        ValueError: A sink needs a package that is not installed.
+        OSError: The outbox cannot be made.
+    """
+    sinks = {each.name: sink_of(each) for each in read_notify_file(file)}
+    outbox = Outbox(folder / OUTBOX, sinks, report, trouble=trouble)
+    outbox.start()
+
+    def tell(call: IncidentCall) -> None:
+        own = call.incident.told.robot
+        of_member = folder / own / EVIDENCE
+        evidence = of_member if own and of_member.is_dir() else folder / EVIDENCE
+        outbox.put(notification_of(call, own or robot, time.time(), evidence))
+
+    return Sinks(outbox, tell)

@@ -1,0 +1,192 @@
+"""Keeps the incidents of a run: the book that says whom to call when, and the log of each robot.
+
+What was called for is in the log before anybody is called. So a keeper that is started again knows
+what goes on and who was called for it, and nobody is called twice or never told that it is over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from strict_files.files import FileError
+from surveillance_runtime.event_log import (
+    Clocks,
+    EventLog,
+    RecordEntry,
+    read,
+    record_in,
+    steady_now,
+)
+from surveillance_runtime.incidents import (
+    Cause,
+    Incident,
+    IncidentBook,
+    IncidentCall,
+    IncidentPhase,
+    IncidentUpdate,
+    SeenThing,
+    Severity,
+)
+
+
+class IncidentKeeper:
+    """Keeps the incidents of a run; one thread at a time.
+
+    Args:
+        call: Called with each call.
+        folder: Of the run, in which each robot of a fleet has a folder of its name; None: nothing
+            is kept.
+        mission_time: Returns the seconds on the mission's clock.
+        steady: Returns the seconds since the machine was started.
+        wall: Returns the seconds since 1970.
+    """
+
+    def __init__(
+        self,
+        call: Callable[[IncidentCall], object],
+        folder: Path | None = None,
+        mission_time: Callable[[], float | None] = lambda: None,
+        steady: Callable[[], float] = steady_now,
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self._call, self._folder, self._mission_time = call, folder, mission_time
+        self._steady, self._wall = steady, wall
+        self._logs: dict[Path, EventLog] = {}
+        self.book = IncidentBook(self._on_call, self._on_note)
+        if folder is not None:
+            self._restore(folder)
+
+    def hear(self, told: IncidentUpdate) -> None:
+        """Take what the owner of an incident tells."""
+        self.book.hear(told, self._steady())
+
+    def restarted(self, owner: str) -> None:
+        """Take that a node was started again."""
+        self.book.restarted(owner, self._steady())
+
+    def advance(self) -> float | None:
+        """Call whom it is time to call; return in how many seconds to look again, None: no need."""
+        now = self._steady()
+        due = self.book.advance(now)
+        return None if due is None else max(0.0, due - now)
+
+    def close(self) -> None:
+        """Tell what is over, and end."""
+        self.book.close(self._steady())
+        for log in self._logs.values():
+            log.close()
+
+    def write(self, kind: str, robot: str, /, **fields: object) -> None:
+        """Write an entry to the log of a robot, or to that of what robots share."""
+        if self._folder is None:
+            return
+        own = self._folder / robot
+        path = record_in(own if robot and own.is_dir() else self._folder)
+        # A full disk: the entry waits, and people are told all the same.
+        with contextlib.suppress(FileError):
+            if path not in self._logs:
+                self._logs[path] = EventLog(path, Clocks(self._wall, self._steady))
+            self._logs[path].write(kind, self._mission_time(), **fields)
+
+    def _on_call(self, call: IncidentCall) -> None:
+        if not call.over:
+            self._write_incident(call.incident, 'call', number=call.number)
+        self._call(call)
+
+    def _on_note(self, incident: Incident) -> None:
+        if incident.ended is None:
+            self._write_incident(incident, 'begin')
+        else:
+            lasted = round(incident.ended - incident.began, 1)
+            self._write_incident(incident, 'end', seconds=lasted)
+
+    def _write_incident(self, incident: Incident, phase: str, **more: object) -> None:
+        told = incident.told
+        fields: dict[str, object] = {
+            'id': told.id,
+            'phase': phase,
+            'robot': told.robot,
+            'node': told.node,
+            'kind': told.cause.kind,
+            'name': told.cause.name,
+            'severity': told.severity.value,
+            'text': told.text,
+            'place': told.place,
+            'action': told.action,
+            'acknowledged_by': told.acknowledged_by,
+            'evidence': list(told.evidence),
+        }
+        if told.finding is not None:
+            fields['finding'] = vars(told.finding)
+        given = {key: value for key, value in fields.items() if value not in ('', [])}
+        self.write('incident', told.robot, **{**given, 'name': told.cause.name}, **more)
+
+    def _restore(self, folder: Path) -> None:
+        """Take up what an earlier keeper of the same run had."""
+        for own in (folder, *(each for each in _below(folder) if record_in(each).is_file())):
+            entries: list[RecordEntry] = []
+            with contextlib.suppress(FileError):
+                entries = read(record_in(own))
+            begun: dict[str, tuple[RecordEntry, list[RecordEntry]]] = {}
+            for entry in entries:
+                if entry.name != 'incident':
+                    continue
+                number, phase = entry.text('id'), entry.text('phase')
+                if phase == 'begin':
+                    begun[number] = entry, []
+                elif phase == 'end':
+                    begun.pop(number, None)
+                elif number in begun:
+                    begun[number][1].append(entry)
+            for first, calls in begun.values():
+                self._take_up(first, calls)
+
+    def _take_up(self, first: RecordEntry, calls: list[RecordEntry]) -> None:
+        now = self._steady()
+        last = calls[-1] if calls else first
+        with contextlib.suppress(ValueError, TypeError, KeyError):  # a stranger's line
+            told = _update_of(last.fields)
+            began, called = (now - self._age(each) for each in (first, last))
+            self.book.restore(told, began, len(calls), called, now)
+
+    def _age(self, entry: RecordEntry) -> float:
+        """Return how long ago an entry was written, seconds."""
+        return max(0.0, self._wall() - entry.at) if entry.at is not None else 0.0
+
+
+def _below(folder: Path) -> list[Path]:
+    try:
+        return sorted(each for each in folder.iterdir() if each.is_dir())
+    except OSError:
+        return []
+
+
+def _update_of(fields: Any) -> IncidentUpdate:
+    """Return the incident of an entry.
+
+    Raises:
+        ValueError, TypeError, KeyError: It is none.
+    """
+
+    def text(key: str) -> str:
+        return str(fields.get(key, ''))
+
+    seen = fields.get('finding')
+    return IncidentUpdate(
+        IncidentPhase.UPDATE,
+        Cause(str(fields['kind']), str(fields['name'])),
+        Severity(fields['severity']),
+        str(fields['text']),
+        str(fields['id']),
+        robot=text('robot'),
+        node=text('node'),
+        place=text('place'),
+        action=text('action'),
+        acknowledged_by=text('acknowledged_by'),
+        evidence=tuple(map(str, fields.get('evidence', ()))),
+        finding=None if seen is None else SeenThing(**seen),
+    )
