@@ -13,14 +13,13 @@ from datetime import date, datetime, timedelta
 from html import escape
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from indoor_watch.day_book import DayBook, Seen
 from indoor_watch.events import Event, EventState
 from indoor_watch.privacy import PictureError, shareable
 from strict_files.files import FileError, read_file, replace_text
 from surveillance_operator.map_command import counted
-from surveillance_runtime.run_files import INCIDENTS
+from surveillance_operator.run_entries import PastIncident, entries_of_run, incidents_of
 
 OBSERVER, EVIDENCE = 'observer.json', 'evidence'
 MOST_BYTES = 200_000_000
@@ -68,7 +67,7 @@ def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
     if not seen and not of_day:
         known = ', '.join(book.days()[-5:]) or 'none'
         raise FileError(f'{folder}: nothing was seen on {wanted}, the newest days are: {known}')
-    called = _called(folder / INCIDENTS, begin, end)
+    called = _called(folder, begin, end)
     written = folder / f'day_{wanted}.html'
     pictures = _Pictures(folder / EVIDENCE, blur=blur)
     replace_text(written, _page(wanted, folder.name, seen, of_day, called, pictures))
@@ -89,20 +88,13 @@ def _day(text: str, book: DayBook) -> str:
         ) from None
 
 
-def _called(path: Path, begin: float, end: float) -> list[dict[str, Any]]:
+def _called(folder: Path, begin: float, end: float) -> list[PastIncident]:
     """Return the incidents that began on a day."""
-    if not path.exists():
-        return []
-    found = []
-    for line in read_file(path, MOST_BYTES).decode('utf-8', 'replace').splitlines():
-        try:
-            entry = json.loads(line)
-            if entry['seconds'] is None and begin <= float(entry['at']) < end:
-                found.append({key: str(entry[key]) for key in ('kind', 'name', 'severity', 'text')})
-                found[-1]['at'] = _clock(float(entry['at']))
-        except (ValueError, KeyError, TypeError):
-            continue  # cut off by a crash
-    return found
+    try:
+        found = incidents_of(entries_of_run(folder, whole=True).entries)
+    except FileError:
+        return []  # the observer ran without a mission
+    return [each for each in found if begin <= each.at < end]
 
 
 class _Pictures:
@@ -134,7 +126,7 @@ def _page(
     run: str,
     seen: Sequence[Seen],
     events: Sequence[Event],
-    called: Sequence[dict[str, Any]],
+    called: Sequence[PastIncident],
     pictures: _Pictures,
 ) -> str:
     unusual = sorted(
@@ -197,12 +189,12 @@ def _checks(seen: Sequence[Seen]) -> str:
     return f'<table>{head}{"".join(rows)}</table>'
 
 
-def _calls(called: Sequence[dict[str, Any]]) -> str:
+def _calls(called: Sequence[PastIncident]) -> str:
     if not called:
         return '<p>nobody was</p>'
     rows = ''.join(
-        f'<tr><td>{each["at"]}</td><td>{escape(each["severity"])}</td>'
-        f'<td>{escape(each["text"])}</td></tr>'
+        f'<tr><td>{_clock(each.at)}</td><td>{escape(each.severity)}</td>'
+        f'<td>{escape(each.text)}</td></tr>'
         for each in called
     )
     return f'<table>{rows}</table>'

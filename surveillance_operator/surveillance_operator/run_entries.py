@@ -60,8 +60,10 @@ def entries_of_run(folder: Path, *, whole: bool = False) -> RunEntries:
         FileError: There is no log, or it cannot be read.
     """
     path, passed = record_in(folder), Counter[str]()
-    found = list(read_all(path, passed)) if whole else read(path, passed)
     old = list(_old_incidents(folder / OLD_INCIDENTS, passed))
+    found: list[RecordEntry] = []
+    if path.exists() or not old:
+        found = list(read_all(path, passed)) if whole else read(path, passed)
     return RunEntries([*old, *on_one_clock(found)], passed)
 
 
