@@ -77,7 +77,8 @@ def _old_incidents(path: Path, passed: Counter[str]) -> Iterator[RecordEntry]:
         try:
             told = json.loads(line)
             at, lasted = float(told['at']), told['seconds']
-            fields = {key: str(told[key]) for key in ('node', 'kind', 'name', 'severity', 'text')}
+            fields = {key: str(told[key]) for key in ('kind', 'name', 'severity', 'text')}
+            fields['node'] = str(told.get('node', ''))
         except (ValueError, KeyError, TypeError):
             passed['incident'] += 1
             continue
