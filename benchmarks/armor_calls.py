@@ -158,7 +158,7 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
     from armor_service.access import Settings
     from armor_service.client import ArmorClient, InProcessTransport
     from armor_service.service import ArmorService
-    from floor_plans import read_place_file
+    from floor_plans import read_place
     from surveillance_ontology.map_ontology import MapOntology
     from surveillance_ontology.patrol_vocabulary import DATA
     from surveillance_ontology.robot_ontology import RobotOntology
@@ -166,7 +166,7 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
     service = ArmorService(Settings(worlds=worlds), store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))
     MapOntology(client).build(
-        read_place_file(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000
+        read_place(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000
     )
     ontology = RobotOntology(client)
     ontology.record_place('E', 2_000_000_000)

@@ -64,8 +64,7 @@ from benchmarks.hosts import Host, Network, may_be_made
 from benchmarks.machine_faults import SmallDisk, SteppedClock
 from benchmarks.processes import end_processes, memory_mb
 from benchmarks.sizes import Size, sized_parser
-from floor_plans import read_place_file
-from floor_plans.regions import Regions
+from floor_plans import RoomMap, read_place
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.srv import ArmorDirective
 from surveillance_runtime.discovery import prefer_quick_discovery
@@ -400,10 +399,10 @@ class Campaign:
             self._clock = SteppedClock(scratch)
         self.watcher = Watcher(self._domain)
         self.results = Results()
-        described = read_place_file(ROOT / 'config' / PLACES[chosen.behaviour])
+        described = read_place(ROOT / 'config' / PLACES[chosen.behaviour])
         positions = described.place.positions
         self._positions = {name: (at[0], at[1]) for name, at in positions.items()}
-        self._regions = Regions(described.plan) if described.plan.is_enclosed else None
+        self._regions = RoomMap(described.plan) if described.plan.is_enclosed else None
         self._hits: list[tuple[float, float]] = []
         self._set_clock = SetClock()
         self._twin: Launcher | None = None

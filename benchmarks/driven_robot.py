@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from floor_plans import plan_grid
 from lidar_navigation.driving.driving import Drive, State
 from lidar_navigation.driving.navigator import Navigator
 from lidar_navigation.driving.path_following import DriveParameters, Velocity
@@ -50,7 +49,7 @@ class DrivenRobot:
     ) -> None:
         self.robot, self._moved, self._seen, self._stepped = robot, moved, seen, stepped
         self.world = robot.world
-        self.grid = plan_grid.draw(self.world.plan)
+        self.grid = self.world.plan.grid()
         doors = {door.name: door.segment for door in self.world.plan.doors.values()}
         planning = PlanningParameters() if radius is None else PlanningParameters(radius=radius)
         self._parameters = DriveParameters() if radius is None else DriveParameters(radius=radius)

@@ -24,8 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.sizes import sized_parser
 from benchmarks.tables import table
 from benchmarks.whole_stack import ROOT
-from floor_plans import plan_grid
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 from lidar_navigation.exploration.exploration import Exploration, Phase
 from lidar_navigation.exploration.frontiers import FrontierParameters
 from lidar_navigation.exploration.map_building import MapBuilder
@@ -116,7 +116,7 @@ def compared(grid: Grid, world: World) -> tuple[float, float]:
     of the distance from an occupied cell's centre to the surface of what is really there, metres.
     """
     fine = 0.02
-    truth = plan_grid.draw(world.plan, fine)
+    truth = world.plan.grid(fine)
     import cv2
 
     regions = cv2.connectedComponents(truth.free.astype(np.uint8), connectivity=4)[1]

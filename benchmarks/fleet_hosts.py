@@ -42,8 +42,7 @@ os.environ |= launched_nodes(os.environ, network=True)
 import rclpy
 from geometry_msgs.msg import PoseStamped
 
-from floor_plans import read_place_file
-from floor_plans.regions import Regions
+from floor_plans import RoomMap, read_place
 from state_machines.exceptions import CallError
 from state_machines.ros import ServiceCaller
 from surveillance_interfaces.msg import Decision
@@ -85,8 +84,8 @@ class Onlooker:
     """
 
     def __init__(self, robots: Sequence[str], domain: int) -> None:
-        self._regions = Regions(read_place_file(PLACE).plan)
-        self._places = sorted(read_place_file(PLACE).place.positions)
+        self._regions = RoomMap(read_place(PLACE).plan)
+        self._places = sorted(read_place(PLACE).place.positions)
         self.now = 0.0
         self.stays: dict[str, list[_Stay]] = {name: [] for name in robots}
         self.decided: dict[str, list[tuple[float, float]]] = {name: [] for name in robots}

@@ -30,7 +30,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from benchmarks.tables import table
-from floor_plans import read_place_file
+from floor_plans import read_place
 from launcher.run import Run
 from launcher.run_processes import node_environ
 from state_machines.ros import ServiceCaller
@@ -130,7 +130,7 @@ def armor_under(robots: int, seconds: float, place: Path) -> None:
         seconds: Of real time.
         place: The place's file.
     """
-    plan = read_place_file(place).plan.place
+    plan = read_place(place).plan.place
     with tempfile.TemporaryDirectory(prefix='fleet-') as name:
         words = ['--map', str(place), '--robots', str(robots)]
         launched = Launched([*words, '--only', 'armor_server,ontology_map_builder'], Path(name))
@@ -208,7 +208,7 @@ def spread(place: Path, robots: int, folder: Path) -> Path:
 
     Beside one another at the station they would leave one after the other, by one door.
     """
-    points = read_place_file(place).plan.place.positions
+    points = read_place(place).plan.place.positions
     names = sorted(points)
     chosen = [names[number * len(names) // robots] for number in range(robots)]
     lines = [

@@ -28,8 +28,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from floor_plans import plan_grid
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map, relative
 from lidar_navigation.localisation.localisation import Localiser
 from lidar_navigation.localisation.odometry import OdometryBuffer, joined
@@ -331,7 +331,7 @@ def drive(world: World, late: float, sweep: float, seconds: float) -> Iterator[t
 def late_scans(size: Size) -> None:
     """Print how late and swept scans change the estimate, with and without joining in time."""
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
-    grid = plan_grid.draw(world.plan, 0.05)
+    grid = world.plan.grid(0.05)
     rows = []
     for late, sweep in ((0.0, 0.0), (0.1, 0.0), (0.3, 0.0), (0.1, 0.1), (0.3, 0.1)):
         row = [f'{late:g} s', f'{sweep:g} s']

@@ -35,7 +35,7 @@ from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.service import ArmorService
 from armor_service.store import Store
 from benchmarks.sizes import sized_parser
-from floor_plans import read_place_file
+from floor_plans import read_place
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import DATA
@@ -65,7 +65,7 @@ class Month:
     def __init__(self, folder: Path, seed: int) -> None:
         self.folder = folder
         self._chance = random.Random(seed)
-        self._place = read_place_file(ROOT / 'config' / 'seven_rooms.yaml').place
+        self._place = read_place(ROOT / 'config' / 'seven_rooms.yaml').place
         self._service = ArmorService(Settings(), store=Store(folder / 'armor_store'))
         client = ArmorClient('month', REFERENCE, InProcessTransport(self._service))
         self._map, self._ontology = MapOntology(client), RobotOntology(client)

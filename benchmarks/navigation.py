@@ -44,8 +44,7 @@ from benchmarks.processes import cpu_seconds, end_processes
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from benchmarks.whole_stack import ROOT, Stack, ros_arguments
-from floor_plans import plan_grid
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
 from lidar_navigation import geometry
@@ -84,7 +83,7 @@ def grid_of(side: int) -> tuple[Grid, npt.NDArray[np.float64], npt.NDArray[np.fl
     rooms = max(2, round(side / 90))
     world = World.from_parameters(regular_places.grid(rooms, rooms))
     cell = rooms * regular_places.ROOM / side
-    drawn = plan_grid.draw(world.plan, cell, margin=0.0)
+    drawn = world.plan.grid(cell, margin=0.0)
     half = regular_places.ROOM / 2
     first = np.array([half, half])
     return drawn, first, rooms * 2 * half - first
@@ -221,7 +220,7 @@ def control(size: Size) -> None:
     """Time of one step of each part of a drive through the seven rooms, without any ROS."""
     world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
     robot = Robot(world, rng=np.random.default_rng(1))
-    drawn = plan_grid.draw(world.plan)
+    drawn = world.plan.grid()
     grid = drawn
     planner = GridPlanner(grid)
     navigator = Navigator()

@@ -40,7 +40,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks.literature_policies import LITERATURE
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from floor_plans import read_place_file
+from floor_plans import read_place
 from patrol_policy.bounds import charge_bound, rule_bound
 from patrol_policy.decision import QUIET, RECHARGE, Rules
 from patrol_policy.graph import (
@@ -85,7 +85,7 @@ class Map:
 
 def place_map(name: str, path: Path) -> Map:
     """Return a place of config/."""
-    place = read_place_file(path).place
+    place = read_place(path).place
     neighbours = {
         room: list(dict.fromkeys(o for door in doors for o in place.doors[door] if o != room))
         for room, doors in place.rooms.items()

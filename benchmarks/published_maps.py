@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.localisation import print_table
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.whole_stack import ROOT, Stack
-from floor_plans import plan_grid, read_place_file
+from floor_plans import read_place
 from floor_plans.occupancy_map import read_map, write_map
 from surveillance_operator.place_import import ImportRequest, import_place
 
@@ -48,7 +48,7 @@ class Patrol:
 
 def patrolled(place: Path, seconds: float) -> Patrol:
     """Patrol a place for simulated seconds."""
-    rooms = read_place_file(place).plan.place.rooms
+    rooms = read_place(place).plan.place.rooms
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / 'events.jsonl'
         stack = Stack(place, {'robot_behavior': {'record': str(record)}})
@@ -102,8 +102,8 @@ def main() -> int:
     seconds = options.size.of(60.0 * options.minutes, 120.0, 5.0)
     if options.size is Size.SMOKE:
         with tempfile.TemporaryDirectory() as folder:
-            plan = read_place_file(ROOT / 'config' / 'seven_rooms.yaml').plan
-            grid = plan_grid.draw(plan)
+            plan = read_place(ROOT / 'config' / 'seven_rooms.yaml').plan
+            grid = plan.grid()
             write_map(
                 Path(folder) / 'map.yaml', grid.cells[::-1], grid.resolution, (*grid.origin, 0.0)
             )
@@ -132,7 +132,7 @@ def patrol_each(maps: Path, only: Sequence[str], simulated: float) -> None:
                 continue
             seconds = time.perf_counter() - begun
             rows_, columns = read_map(path).cells.shape
-            rooms = read_place_file(place).plan.place.rooms
+            rooms = read_place(place).plan.place.rooms
             with contextlib.chdir(folder):  # a map's file is named as seen from the place's
                 run = patrolled(place, simulated)
         rows.append(

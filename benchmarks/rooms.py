@@ -33,8 +33,8 @@ from skimage.segmentation import watershed
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
+from floor_plans import Grid
 from floor_plans.map_rooms import propose, segment
-from floor_plans.occupancy_grid import Grid
 from floor_plans.occupancy_map import OccupancyMap
 
 FREE = 205

@@ -35,9 +35,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from floor_plans.floor_plan import Marker
-from floor_plans.occupancy_grid import Grid
-from floor_plans.plan_grid import draw
+from floor_plans import Grid, Marker
 from indoor_watch.day_book import DayBook
 from indoor_watch.events import Event, EventBook
 from indoor_watch.evidence import EvidenceStore
@@ -141,7 +139,7 @@ class Rounds:
         self.world = world
         self.stage = Stage(self.robot)
         if Rounds.grid is None:
-            Rounds.grid = draw(world.plan, 0.05)
+            Rounds.grid = world.plan.grid(0.05)
             Rounds.rooms = PlaceRooms(world, Rounds.grid)
         self.lidar = LidarModel()
         self.pose_error = POSE_ERROR

@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.events import EventBook
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.watcher import Watcher

@@ -20,9 +20,8 @@ from PIL import Image
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
-from floor_plans.plan_grid import draw
 from surveillance_operator.place_import import ImportRequest, import_place
 from surveillance_operator.place_page.edit_command import editor_page
 from tests.operator.browser import DESK, Viewer
@@ -36,7 +35,7 @@ WIDE = 900
 
 def furnished_map(path: Path) -> None:
     """Write the map of a furnished, turned office."""
-    grid = draw(read_place_file(ROOT / 'config' / 'office.yaml').plan, SIDE)
+    grid = read_place(ROOT / 'config' / 'office.yaml').plan.grid(SIDE)
     rows, columns = grid.cells.shape
     grey = np.full((rows, columns), 128, np.uint8)
     grey[grid.free], grey[grid.occupied] = 255, 0

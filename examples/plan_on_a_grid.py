@@ -9,7 +9,8 @@ import itertools
 
 import numpy as np
 
-from floor_plans.occupancy_grid import OCCUPIED, Grid
+from floor_plans import Grid
+from floor_plans.occupancy_grid import OCCUPIED
 from lidar_navigation.geometry import Points, length
 from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError
 

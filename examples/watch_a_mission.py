@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from rich.console import Console
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from patrol_policy.world import Decision
 from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_state import MissionState, Status

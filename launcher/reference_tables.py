@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from floor_plans.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
+from floor_plans.parameters import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
 from launcher import package_commands
 from launcher.environment import CHECKOUT
 from surveillance_runtime import node_table

@@ -294,10 +294,10 @@ class Run:
         if self.domain is not None and not 0 <= self.domain <= LAST_DOMAIN:
             raise ValueError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
         if self.place is not None:
-            from floor_plans import read_place_file  # needs a set-up
+            from floor_plans import read_place  # needs a set-up
 
             try:
-                read_place_file(self.place, reserved=BY_NAME)
+                read_place(self.place, reserved=BY_NAME)
             except FileError as error:
                 raise ValueError(f'--map {error}') from None
         if self.stage is not None:

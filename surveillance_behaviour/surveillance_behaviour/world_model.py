@@ -17,8 +17,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from floor_plans.patrol_rules import PatrolRules
-from floor_plans.stations import Station
+from floor_plans import PatrolRules, Station
 from patrol_policy.battery import Battery, ChargeCurve, Energy
 from patrol_policy.decision import (
     ALERT,

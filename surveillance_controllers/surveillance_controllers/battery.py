@@ -20,7 +20,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from floor_plans.stations import Station, station_at
+from floor_plans import Station
+from floor_plans.parameters import station_at
 from lidar_navigation.geometry import Pose, angle_between
 from strict_files.settings import parameter
 from surveillance_runtime.robot_arm import ARM, TrajectoryPoint

@@ -23,7 +23,7 @@ from std_msgs.msg import Bool, Float32, UInt8
 from std_srvs.srv import Empty
 from trajectory_msgs.msg import JointTrajectory
 
-from floor_plans.stations import stations_in
+from floor_plans.parameters import stations_in
 from state_machines.ros import ClockWait
 from surveillance_controllers import conversions, stimuli
 from surveillance_controllers.battery import Battery, BatteryInUse

@@ -26,7 +26,8 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from floor_plans.zones import Zones, zones_from
+from floor_plans import Zones
+from floor_plans.parameters import zones_from
 from lidar_navigation.driving.path_following import (
     Velocity,
     as_forwards,

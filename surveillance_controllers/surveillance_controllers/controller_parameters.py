@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from floor_plans.stations import Station
+from floor_plans import Station
 from lidar_navigation.geometry import Points
 from strict_files.settings import converted, parameter
 from surveillance_controllers.battery import BatteryParameters

@@ -21,7 +21,7 @@ from surveillance_controllers.battery import Battery
 from surveillance_runtime.conversions import map_from, point_message
 
 if TYPE_CHECKING:
-    from floor_plans.occupancy_grid import Grid
+    from floor_plans import Grid
     from lidar_navigation.driving.path_following import Velocity
 
 

@@ -22,7 +22,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from floor_plans.occupancy_map import write_map
 from lidar_navigation.driving.path_following import DriveParameters, Velocity
 from lidar_navigation.exploration.exploration import Exploration, Phase

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 from nav_msgs.msg import Path
 
-from floor_plans.stations import AT_STATION
+from floor_plans.parameters import AT_STATION
 from lidar_navigation import geometry
 from lidar_navigation.geometry import Points
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer

@@ -16,7 +16,9 @@ from armor_service.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
 )
-from floor_plans import Place, PlaceError, Position, description_of, edited_place, problem_in_name
+from floor_plans import Place, PlaceError
+from floor_plans.parameters import description_of, edited_place, problem_in_name
+from floor_plans.shapes import Position
 from strict_files.files import KeptFile
 from strict_files.settings import parameter
 from surveillance_ontology.map_ontology import MapOntology

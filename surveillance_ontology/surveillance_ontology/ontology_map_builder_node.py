@@ -20,11 +20,15 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from std_msgs.msg import String
 
-from floor_plans import Place, PlaceError, description_of
-from floor_plans.patrol_rules import patrol_rules
-from floor_plans.rooms import place_from
-from floor_plans.stations import AT_STATION, stations_in
-from floor_plans.zones import zones_from
+from floor_plans import Place, PlaceError
+from floor_plans.parameters import (
+    AT_STATION,
+    description_of,
+    patrol_rules,
+    place_from,
+    stations_in,
+    zones_from,
+)
 from strict_files.files import in_one_line, replace_text
 from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import (

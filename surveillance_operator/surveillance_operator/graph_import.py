@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from floor_plans.rooms import problem_in_name
+from floor_plans.parameters import problem_in_name
 from patrol_policy.graph import GraphError
 from patrol_policy.patrolling_sim import read_patrolling_sim
 from strict_files.files import FileError, read_file

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from floor_plans.regions import ROBOT_RADIUS
+from floor_plans import ROBOT_RADIUS
 from surveillance_operator.place_import import ImportRequest, import_place
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 

@@ -10,10 +10,15 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from floor_plans import Place, PlaceError, PlaceFile, read_place_file
-from floor_plans.drawing import Run, draw_place
+from floor_plans import (
+    FloorPlan,
+    Place,
+    PlaceError,
+    PlaceFile,
+    read_place,
+)
+from floor_plans.drawing import DrivenRun, draw_place
 from floor_plans.filter_masks import write_filter_masks
-from floor_plans.floor_plan import FloorPlan
 from patrol_policy.battery import Battery, ChargeCurve, Draw
 from patrol_policy.decision import LONGEST_THRESHOLD, DecisionSettings
 from patrol_policy.graph import PatrolGraph
@@ -119,7 +124,7 @@ def promised(
     return promises(world, battery, settings, sorted(place.rooms))
 
 
-def run_of(events: Sequence[event_log.RecordEntry], place: Place, source: str) -> Run:
+def run_of(events: Sequence[event_log.RecordEntry], place: Place, source: str) -> DrivenRun:
     """Return what a mission's record adds to the picture of its place.
 
     Raises:
@@ -134,7 +139,7 @@ def run_of(events: Sequence[event_log.RecordEntry], place: Place, source: str) -
         line += f' · the ways of the last {listed / 3600.0:.1f} h'
     driven, planned, failures = _drives(events, place)
     charged = Counter(event.text('place') for event in events if event.name == 'recharge')
-    return Run(
+    return DrivenRun(
         driven=driven,
         planned=planned,
         failures=failures,
@@ -250,7 +255,7 @@ def _positive(text: str) -> float:
 
 
 def _draw(options: argparse.Namespace) -> list[str]:
-    file = read_place_file(options.place, reserved=BY_NAME)
+    file = read_place(options.place, reserved=BY_NAME)
     plan = file.plan
     try:
         checked_names(plan.place)

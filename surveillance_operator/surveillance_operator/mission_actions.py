@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
 from armor_service.facts import parse_fact
-from floor_plans import problem_in_name
+from floor_plans.parameters import problem_in_name
 from state_machines.exceptions import CallError, CallInterruptedError
 from state_machines.ros import ServiceCaller, UnavailableError
 from strict_files.suggestions import nearest

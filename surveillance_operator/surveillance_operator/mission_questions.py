@@ -13,10 +13,8 @@ from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
 
 from armor_service.facts import ShortFact
-from floor_plans.floor_plan import Door
-from floor_plans.rooms import ZONE_TABLES, PlaceError, nested
-from floor_plans.stations import stations_in
-from floor_plans.zones import Zone, zones_from
+from floor_plans import Door, PlaceError, Zone
+from floor_plans.parameters import ZONE_TABLES, nested, stations_in, zones_from
 from state_machines.ros import CallError, ServiceCaller
 from surveillance_interfaces.srv import ReferenceName, RoomPosition
 from surveillance_ontology.armor_client import ArmorClient, FactSubscription

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.floor_plan import Segment
-from floor_plans.occupancy_grid import Grid
-from floor_plans.zones import Zone
+from floor_plans import Grid, Zone
+from floor_plans.shapes import Segment
 from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from patrol_policy.policies import POLICIES
 from patrol_policy.promises import Promise
 from patrol_policy.promises import lines as promise_lines

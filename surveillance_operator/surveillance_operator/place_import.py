@@ -14,12 +14,17 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from floor_plans import problem_in_name, read_place_file
+from floor_plans import ROBOT_RADIUS, read_place
 from floor_plans.drawing import draw_place
 from floor_plans.map_rooms import Proposal, propose
 from floor_plans.occupancy_grid import distance_to
-from floor_plans.occupancy_map import OccupancyMap, is_picture, read_map, write_map
-from floor_plans.regions import ROBOT_RADIUS
+from floor_plans.occupancy_map import (
+    OccupancyMap,
+    is_picture,
+    read_map,
+    write_map,
+)
+from floor_plans.parameters import problem_in_name
 from floor_plans.writing import format_place
 from strict_files.files import FileError, in_one_line, read_file, replace_text
 from strict_files.yaml_file import read_yaml_file
@@ -161,7 +166,7 @@ def _draw(request: ImportRequest, text: str, picture: Path) -> list[str]:
         replace_text(out, text)
     except OSError as error:
         raise FileError(in_one_line(error)) from None
-    plan = read_place_file(out, radius=request.radius).plan
+    plan = read_place(out, radius=request.radius).plan
     title = out.stem.replace('_', ' ')
     image = draw_place(plan, title[:1].upper() + title[1:], facts(plan))
     try:

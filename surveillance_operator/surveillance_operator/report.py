@@ -15,9 +15,8 @@ from html import escape
 from itertools import groupby, pairwise
 from pathlib import Path
 
-from floor_plans import read_place_file
-from floor_plans.drawing import Run, draw_place
-from floor_plans.floor_plan import FloorPlan
+from floor_plans import FloorPlan, read_place
+from floor_plans.drawing import DrivenRun, draw_place
 from patrol_policy.promises import lines as promise_lines
 from strict_files.files import FileError, replace_text
 from surveillance_behaviour.mission import mission_log
@@ -85,7 +84,7 @@ def draw_picture(folder: Path) -> Path | None:
             run = _together(runs)
         else:
             _, plan, alone = _material(folder)
-            run = alone or Run()
+            run = alone or DrivenRun()
         if plan is None:
             return None
         path = folder / PICTURE
@@ -102,13 +101,13 @@ def _one_line(folder: Path) -> Iterator[None]:
         raise FileError(f'{error.filename or folder}: {error.strerror or error}') from None
 
 
-def _material(folder: Path) -> tuple[RunEntries, FloorPlan | None, Run | None]:
+def _material(folder: Path) -> tuple[RunEntries, FloorPlan | None, DrivenRun | None]:
     """Return what happened in a run, its place, and what it did there; no place: none of that."""
     happened = entries_of_run(folder)
     file = folder / PLACE
     if not file.exists() or not happened.of_mission:
         return happened, None, None
-    plan = read_place_file(file).plan
+    plan = read_place(file).plan
     return happened, plan, run_of(happened.of_mission, plan.place, str(record_in(folder)))
 
 
@@ -154,28 +153,28 @@ def _records(robots: Mapping[str, Path]) -> tuple[dict[str, Sequence[RecordEntry
 
 def _ways(
     folder: Path, records: Mapping[str, Sequence[RecordEntry]]
-) -> tuple[FloorPlan | None, list[Run]]:
+) -> tuple[FloorPlan | None, list[DrivenRun]]:
     """Return the place of a fleet, and what each robot did there."""
     if not (folder / PLACE).exists():
         return None, []
-    plan = read_place_file(folder / PLACE).plan
+    plan = read_place(folder / PLACE).plan
     runs = []
     for robot, events in records.items():
         try:
             runs.append(run_of(events, plan.place, robot))
         except FileError:  # nothing was recorded of it
-            runs.append(Run())
+            runs.append(DrivenRun())
     return plan, runs
 
 
-def _together(runs: Sequence[Run]) -> Run:
+def _together(runs: Sequence[DrivenRun]) -> DrivenRun:
     """Return what several robots did, for one picture."""
     visits: Counter[str] = Counter()
     recharges: Counter[str] = Counter()
     for run in runs:
         visits.update(run.visits)
         recharges.update(run.recharges)
-    return Run(
+    return DrivenRun(
         driven=[way for run in runs for way in run.driven],
         planned=[way for run in runs for way in run.planned],
         failures=[point for run in runs for point in run.failures],
@@ -281,7 +280,7 @@ def _one_time_line(records: Mapping[str, Sequence[RecordEntry]], begin: float) -
     return [[_clock(at - begin), *line] for at, _, line in sorted(told)]
 
 
-def _map(plan: FloorPlan, run: Run) -> str:
+def _map(plan: FloorPlan, run: DrivenRun) -> str:
     """Return the picture of the place with the ways driven, inside of the page.
 
     The page tells the summary and the waits itself, so the picture is without them.

@@ -13,8 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.floor_plan import Segment
-from floor_plans.occupancy_grid import FREE, OCCUPIED, Box, Grid, distance_to, drawn_lines
+from floor_plans import Grid
+from floor_plans.occupancy_grid import (
+    FREE,
+    OCCUPIED,
+    Box,
+    distance_to,
+    drawn_lines,
+)
+from floor_plans.shapes import Segment
 
 MOST_CELLS = 200_000
 """Of a larger map several cells are taken together."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from floor_plans import problem_in_name
+from floor_plans.parameters import problem_in_name
 from strict_files.yaml_file import KeyPath, YamlFile, read_yaml_file
 
 _KEYS = ('room', 'x', 'y', 'connections', 'hangs_at')

@@ -27,7 +27,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Bool, String
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.answers import answered
 from indoor_watch.backlog import Backlog
 from indoor_watch.day_book import DayBook

@@ -24,10 +24,15 @@ from typing import Any
 
 import yaml
 
-from floor_plans import Place, PlaceError, checked_plan
-from floor_plans.description import map_file_beside
-from floor_plans.regions import ROBOT_RADIUS
-from floor_plans.rooms import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS, tables_of
+from floor_plans import ROBOT_RADIUS, Place, PlaceError
+from floor_plans.parameters import (
+    GEOMETRY_KEYS,
+    PATROL_KEYS,
+    PLACE_KEYS,
+    checked_plan,
+    map_file_beside,
+    tables_of,
+)
 from strict_files.files import FileError
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import UNREADABLE, RosLoader, YamlFile, parameters_of, read_yaml_file

@@ -28,7 +28,7 @@ from surveillance_runtime.robot_arm import TrajectoryPoint
 if TYPE_CHECKING:
     from trajectory_msgs.msg import JointTrajectory
 
-    from floor_plans.occupancy_grid import Grid
+    from floor_plans import Grid
 
 PlanarPose = tuple[float, float, float]
 """x, y in metres and yaw in radians."""
@@ -207,7 +207,7 @@ def map_from(message: OccupancyGrid, most_cells: int) -> Grid:
         ValueError: It has no cells, not as many as it says, or too many.
     """
     # Only here: most processes never see a map.
-    from floor_plans.occupancy_grid import Grid
+    from floor_plans import Grid
 
     info = message.info
     size = f'{info.width} x {info.height}'
@@ -236,7 +236,7 @@ def _straightened(
 
     The new cells are smaller, so that no wall gets a gap.
     """
-    from floor_plans.occupancy_grid import Grid
+    from floor_plans import Grid
 
     x, y, yaw = origin
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -12,11 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from floor_plans.floor_plan import Door, Segment
-from floor_plans.patrol_rules import PatrolRules, patrol_rules
-from floor_plans.rooms import PATROL_TABLES, ZONE_TABLES, Place, PlaceError, make_place, nested
-from floor_plans.stations import Station, stations_of
-from floor_plans.zones import Zones, zones_from
+from floor_plans import Door, PatrolRules, Place, PlaceError, Station, Zones
+from floor_plans.parameters import (
+    PATROL_TABLES,
+    ZONE_TABLES,
+    make_place,
+    nested,
+    patrol_rules,
+    stations_of,
+    zones_from,
+)
+from floor_plans.shapes import Segment
 from lidar_navigation.geometry import Points
 from strict_files.settings import parameter
 from surveillance_runtime import parameter_checks
@@ -113,7 +119,7 @@ class _Single:
 
 
 @dataclass(frozen=True)
-class _Rooms:
+class _RechargeRooms:
     recharge_rooms: tuple[str, ...] = parameter((), 'Places with a charging station.', of=str)
 
 
@@ -135,7 +141,7 @@ def described_stations(
         ParameterError: What is described is wrong.
     """
     if recharge_rooms is None:
-        recharge_rooms = node.declare_fields(_Rooms()).recharge_rooms
+        recharge_rooms = node.declare_fields(_RechargeRooms()).recharge_rooms
     described = {
         'recharge_rooms': recharge_rooms,
         'station': list(node.declare_fields(_Single()).station),

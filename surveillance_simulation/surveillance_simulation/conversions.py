@@ -14,8 +14,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Header
 
-from floor_plans.floor_plan import Marker
-from floor_plans.rooms import Pose as PlanePose
+from floor_plans import Marker
+from floor_plans.shapes import Pose as PlanePose
 from marker_detection.rotations import quaternion_of
 from surveillance_interfaces.msg import DoorStates
 from surveillance_interfaces.srv import SetMarker

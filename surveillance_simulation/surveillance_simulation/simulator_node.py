@@ -25,8 +25,8 @@ from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 
 from floor_plans import PlaceError
-from floor_plans.fleet import members_of
-from floor_plans.rooms import PLACE_TABLES, Pose, nested
+from floor_plans.parameters import PLACE_TABLES, members_of, nested
+from floor_plans.shapes import Pose
 from strict_files.files import FileError, LineFile
 from surveillance_interfaces.msg import MarkerDetectionArray, RobotPlace
 from surveillance_runtime.conversions import (

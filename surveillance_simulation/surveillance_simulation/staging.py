@@ -30,8 +30,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from floor_plans import PlaceError
-from floor_plans.floor_plan import Marker
+from floor_plans import Marker, PlaceError
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import EntryError, read_table
 from surveillance_simulation.robot.robot import Robot

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from floor_plans.stations import AT_STATION
+from floor_plans.parameters import AT_STATION
 from patrol_policy.decision import NowhereToGoError
 from patrol_policy.world import Decision
 from state_machines import Interrupt

@@ -12,7 +12,7 @@ from armor_service.client import (
     InProcessTransport,
 )
 from armor_service.service import ArmorService
-from floor_plans import read_place_file
+from floor_plans import read_place
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.ros_adapters.armor_knowledge import ArmorKnowledge, Whereabouts
@@ -20,7 +20,7 @@ from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import DATA
 from surveillance_ontology.robot_ontology import RobotOntology, Snapshot
 
-PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
+PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 RULES = ('URGENT', 'CORRIDOR', 'ROOM')
 NOBODY = Interrupt()
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import pytest
 
-from floor_plans.stations import Station
+from floor_plans import Station
 from patrol_policy.decision import SHARE, URGENT, WAIT, DecisionSettings, Rules
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
 from patrol_policy.world import Decision

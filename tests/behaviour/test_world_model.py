@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from floor_plans.patrol_rules import PatrolRules
+from floor_plans import PatrolRules
 from patrol_policy.decision import REQUEST, DecisionSettings, NowhereToGoError
 from state_machines import Interrupt
 from surveillance_behaviour.experience import Experience

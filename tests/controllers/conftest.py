@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import yaml
 
-from floor_plans.occupancy_grid import Grid, with_walls
+from floor_plans import Grid
+from floor_plans.occupancy_grid import with_walls
 from lidar_navigation.geometry import Scan
 from surveillance_simulation.world.world import World, read_world
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from floor_plans.stations import Station
+from floor_plans import Station
 from surveillance_controllers.battery import Battery, BatteryInUse, BatteryParameters
 from surveillance_runtime.robot_arm import TrajectoryPoint
 

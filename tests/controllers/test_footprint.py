@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from floor_plans import plan_grid
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.driving.driving import Drive, State
 from lidar_navigation.driving.navigator import Navigator
 from lidar_navigation.driving.path_following import DriveParameters, Velocity, room_ahead, safe_turn
@@ -122,7 +121,7 @@ def test_a_long_robot_drives_through_doors_of_a_foreign_physics_without_a_contac
     assert isinstance(world, World)
     physics = PhysicsModel(footprint=LONG, friction=0.5, sweep=0.0)
     robot = Robot(world, BaseModel(radius=BODY.circumscribed), physics=physics)
-    grid = plan_grid.draw(world.plan)
+    grid = world.plan.grid()
     paths, parameters = planner(grid, LONG), DriveParameters(footprint=LONG)
     navigator = Navigator()
     navigator.set_map(grid)

@@ -12,8 +12,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from skimage.graph import MCP_Geometric
 
-from floor_plans.occupancy_grid import Grid, distance_to, drawn_lines, with_walls
-from floor_plans.zones import zones_from
+from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to, drawn_lines, with_walls
+from floor_plans.parameters import zones_from
 from lidar_navigation import geometry
 from lidar_navigation.planning.grid_planning import (
     GridPlanner,

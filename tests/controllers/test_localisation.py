@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map, relative
 from lidar_navigation.localisation.localisation import Localiser
 

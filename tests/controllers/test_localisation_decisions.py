@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.geometry import Points, Pose, Scan
 from lidar_navigation.localisation.localisation import Localiser, _apart, _overlap, _Rival
 

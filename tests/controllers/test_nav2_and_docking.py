@@ -16,7 +16,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
-from floor_plans.stations import Station
+from floor_plans import Station
 from state_machines import Interrupt
 from state_machines.ros import CallInterruptedError, GoalCaller, GoalEnd, UnavailableError
 from surveillance_controllers.controller_parameters import MotionSettings

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans.floor_plan import Door
-from floor_plans.zones import zones_from
+from floor_plans import Door
+from floor_plans.parameters import zones_from
 from lidar_navigation.driving.driving import Drive, State
 from lidar_navigation.driving.navigator import Navigator
 from lidar_navigation.driving.obstacle_memory import ObstacleMemory

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.driving.obstacle_memory import ObstacleMemory
 from lidar_navigation.geometry import Scan
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.localisation.place_locator import PlaceLocator, PlaceRegions, _stretched
 
 SIDE = 0.05

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import regular_places
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.exploration.exploration import Exploration, Phase
 from lidar_navigation.exploration.foreign_map import ForeignMap
 from lidar_navigation.exploration.frontiers import (

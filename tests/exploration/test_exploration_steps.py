@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.driving.driving import Drive, Spin, State
 from lidar_navigation.driving.path_following import Velocity
 from lidar_navigation.exploration.exploration import Exploration, Phase

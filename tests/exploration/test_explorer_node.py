@@ -13,7 +13,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import LaserScan
 
 from benchmarks import regular_places
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from floor_plans.occupancy_map import read_map
 from lidar_navigation.exploration.exploration import Phase
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE, Explorer

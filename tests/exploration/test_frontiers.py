@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 from skimage.graph import MCP_Geometric
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.exploration.evidence_grid import HIT, PASSED, EvidenceGrid
 from lidar_navigation.exploration.foreign_map import ForeignMap
 from lidar_navigation.exploration.frontiers import (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.exploration.map_building import MapBuilder, MappingParameters
 from lidar_navigation.geometry import Pose, Scan
 

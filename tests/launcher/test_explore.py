@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
 from launcher.explore import EXIT_NOTHING_SEEN, close, options_of
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE
@@ -82,7 +82,7 @@ def test_the_map_becomes_a_place(
         'hut_place.png',
         'hut_place.yaml',
     ]
-    place = read_place_file(tmp_path / 'hut_place.yaml')
+    place = read_place(tmp_path / 'hut_place.yaml')
     assert len(place.plan.place.rooms) == 2
     assert len(place.plan.doors) == 1
     assert place.plan.start[:2] == (0.0, 0.0)
@@ -98,7 +98,7 @@ def test_a_map_may_have_any_name(
     options = options_of(['--out', "# Anna's hut: 2.yaml", '--robot', 'turtlebot4'])
     assert close(run, options, CONFIG) == 0
     assert '--mode SIMULATED --robot turtlebot4 --map' in capsys.readouterr().out
-    assert read_place_file(tmp_path / "# Anna's hut: 2_place.yaml").plan.doors
+    assert read_place(tmp_path / "# Anna's hut: 2_place.yaml").plan.doors
 
 
 def test_a_map_that_cannot_be_written_is_not_lost(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from launcher.fleet_launch import parts
 from launcher.run import Run, make_parser, wanted_run
 from launcher.run_configuration import configuration, profile_of
@@ -129,7 +129,7 @@ def test_a_rule_about_a_place_that_is_not_there_is_refused_before_a_start(tmp_pa
 )
 def test_a_wrong_robot_costs_one_line(tmp_path, robots, problem):
     with pytest.raises(FileError, match=problem) as told:
-        read_place_file(place_with(tmp_path, robots), reserved=BY_NAME)
+        read_place(place_with(tmp_path, robots), reserved=BY_NAME)
     assert '\n' not in str(told.value)
 
 

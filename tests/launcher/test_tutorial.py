@@ -12,9 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
-from floor_plans.plan_grid import draw
 from launcher import cli
 from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
 from tests.operator.test_rmf_building import building, level
@@ -108,7 +107,7 @@ def test_the_page_about_your_building_does_what_it_says(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    grid = draw(read_place_file(ROOT / 'config' / 'seven_rooms.yaml').plan)
+    grid = read_place(ROOT / 'config' / 'seven_rooms.yaml').plan.grid()
     write_map(tmp_path / 'building.yaml', grid.cells[::-1], 0.05, (*grid.origin, 0.0))
     (tmp_path / 'plan.png').write_bytes((tmp_path / 'building.png').read_bytes())
     building(tmp_path, level('L1', 0.0), level('L2', 4.0))

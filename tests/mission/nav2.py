@@ -10,7 +10,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
-from floor_plans import plan_grid, read_place_file
+from floor_plans import read_place
 from lidar_navigation.geometry import equally_spaced
 from state_machines.ros import GoalAbortedError, GoalRun, GoalServer
 from surveillance_runtime.conversions import map_message, pose_estimate, pose_from, pose_message
@@ -29,9 +29,9 @@ class MapServer(PatrolNode):
 
     def __init__(self, place: Path, **options: Any) -> None:
         super().__init__('map_server', **options)
-        plan = read_place_file(place).plan
+        plan = read_place(place).plan
         assert plan is not None
-        grid = plan_grid.draw(plan)
+        grid = plan.grid()
         topic = self.create_publisher(OccupancyGrid, 'map', STATE_QOS)
         topic.publish(map_message(grid, 'map', self.get_clock().now().to_msg()))
 

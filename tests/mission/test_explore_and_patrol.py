@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from benchmarks import regular_places
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.writing import format_place
 
 pytestmark = pytest.mark.long
@@ -33,7 +33,7 @@ def test_a_building_is_explored_and_patrolled(tmp_path: Path) -> None:
     building.write_text(format_place(regular_places.grid(2, 2), 'A building of four rooms'))
     said = launch(['explore', '--map', str(building)], tmp_path)
     assert 'patrol: python3 launch.py --mode SIMULATED --map building_place.yaml' in said
-    place = read_place_file(tmp_path / 'building_place.yaml').plan
+    place = read_place(tmp_path / 'building_place.yaml').plan
     assert len(place.place.rooms) == 4
     assert len(place.doors) == 4
     assert yaml.safe_load((tmp_path / 'building.yaml').read_text())['image'] == 'building.pgm'

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from floor_plans import plan_grid, read_place_file
+from floor_plans import read_place
 from lidar_navigation.localisation.place_locator import PlaceRegions
 from surveillance_interfaces.msg import RobotPlace
 from surveillance_runtime.qos import STATE_QOS
@@ -49,8 +49,8 @@ def robot(graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterat
 
 
 def place_regions() -> PlaceRegions:
-    file = read_place_file(PLACE)
-    grid = plan_grid.draw(file.plan)
+    file = read_place(PLACE)
+    grid = file.plan.grid()
     doors = [door.segment for door in file.plan.doors.values()]
     return PlaceRegions(grid, doors, file.place.positions)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.answers import answered
 from indoor_watch.day_book import DayBook, Seen
 from indoor_watch.events import EventBook, EventState

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.camera_floor import CameraFloor
 from indoor_watch.hung_markers import CameraView
 

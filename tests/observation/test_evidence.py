@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.evidence import DAY, EvidenceStore, is_sweep, oldest, side_by_side, sweep_picture
 
 PLAIN = np.full((40, 60), 90, np.uint8)

@@ -16,8 +16,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from floor_plans.floor_plan import Marker
-from floor_plans.plan_grid import draw
+from floor_plans import Marker
 from indoor_watch.events import Event, EventBook
 from indoor_watch.hung_markers import CameraView, SeenMarker
 from indoor_watch.marker_checks import MarkerChecks
@@ -60,7 +59,7 @@ class Patrol:
         world = read_world(PLACE)
         self.stage, plan = Stage(Robot(world)), world.plan
         world.hang_marker(Marker('m21', 21, -3.93, -1.5, 1.0, 0.0, SIDE))
-        grid, self.points = draw(plan, 0.05), plan.place.positions
+        grid, self.points = plan.grid(0.05), plan.place.positions
         doors = [each.segment for each in plan.doors.values()]
         regions = PlaceRegions(grid, doors, self.points)
         rooms = SimpleNamespace(

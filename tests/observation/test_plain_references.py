@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch import doors, views
 from indoor_watch.doors import DoorState, read_door
 from indoor_watch.floor import Change, FloorView, FloorVisit, changes, is_leaf

@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans.description import read_place_file
-from floor_plans.occupancy_grid import Grid
-from floor_plans.plan_grid import draw
+from floor_plans import Grid, read_place
 from indoor_watch.hung_markers import HungSpot
 from indoor_watch.marker_checks import MarkerChecks
 from indoor_watch.viewpoints import ENOUGH, Viewpoints
@@ -66,9 +64,9 @@ def test_a_second_look_is_from_another_side():
 
 @pytest.mark.parametrize('name', ['patrol_world'])
 def test_the_rooms_of_a_place_are_covered(name: str):
-    place = read_place_file(CONFIG / f'{name}.yaml')
+    place = read_place(CONFIG / f'{name}.yaml')
     plan, points = place.plan, place.place.positions
-    grid = draw(plan)
+    grid = plan.grid()
     regions = PlaceRegions(grid, [each.segment for each in plan.doors.values()], points)
     chosen = Viewpoints(grid, 0.22)
     for room, point in points.items():

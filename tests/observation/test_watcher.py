@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.events import EventBook, EventState
 from indoor_watch.evidence import EvidenceStore
 from indoor_watch.hung_markers import CameraView

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.events import EventBook
 from indoor_watch.floor import FloorView
 from indoor_watch.observations import Kind, Observation

@@ -11,14 +11,14 @@ import pytest
 from armor_service.client import ArmorClient, ArmorServiceInternalError, InProcessTransport
 from armor_service.protocol import DirectiveRequest, ListResponse
 from armor_service.service import ArmorService
-from floor_plans import read_place_file
+from floor_plans import read_place
 from libs.armor_service.tests.seven_rooms import IRI
 from surveillance_ontology.event_facts import MOST_EVENTS, EventFact, EventOntology, Sighting
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import ONTOLOGY
 from surveillance_ontology.robot_ontology import RobotOntology
 
-PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
+PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 SEEN = Sighting(130, 0.98, (10.0, 14.5), '3_130_door-D3-closed.jpg')
 DOOR = EventFact(3, 'Door', 'closed', 'R3', 'D3', 'Alert', 'Open', SEEN, SEEN, 20)
 

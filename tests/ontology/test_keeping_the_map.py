@@ -11,7 +11,8 @@ from typing import Any, cast
 import pytest
 
 from armor_service.client import ArmorServiceCallError, ArmorServiceInternalError
-from floor_plans import Place, PlaceError, make_place
+from floor_plans import Place, PlaceError
+from floor_plans.parameters import make_place
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import never_visited

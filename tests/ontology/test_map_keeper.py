@@ -19,7 +19,8 @@ from armor_service.client import (
 )
 from armor_service.protocol import DirectiveRequest
 from armor_service.service import ArmorService
-from floor_plans import Place, PlaceError, description_of, make_place
+from floor_plans import Place, PlaceError
+from floor_plans.parameters import description_of, make_place
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, SEVEN_ROOMS
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source, extended
 from surveillance_ontology.map_ontology import MapOntology, closed_doors, shown_doors

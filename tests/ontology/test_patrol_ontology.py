@@ -15,13 +15,13 @@ from armor_service.client import (
     InProcessTransport,
 )
 from armor_service.service import ArmorService
-from floor_plans import read_place_file
+from floor_plans import read_place
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import OntologyNotReadyError
 from surveillance_ontology.robot_ontology import RobotOntology
 
-PLACE = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
+PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 RULES = ('URGENT', 'CORRIDOR', 'ROOM')
 
 

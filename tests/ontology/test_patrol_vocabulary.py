@@ -16,7 +16,7 @@ from armor_service.client import (
 )
 from armor_service.protocol import DirectiveRequest, DirectiveResponse, ListResponse
 from armor_service.service import ArmorService
-from floor_plans import Place, PlaceError, read_place_file
+from floor_plans import Place, PlaceError, read_place
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY
 from surveillance_ontology import patrol_directives
 from surveillance_ontology.map_keeper import MapKeeper, Reports, RoomNote, Source
@@ -29,7 +29,7 @@ from surveillance_ontology.patrol_vocabulary import (
 )
 from surveillance_ontology.robot_ontology import RobotOntology
 
-SEVEN = read_place_file(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
+SEVEN = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
 
 
 def place_of(rooms: dict[str, list[str]], closed: tuple[str, ...] = ()) -> Place:

@@ -28,7 +28,7 @@ from rich.console import Console
 from std_msgs.msg import String, UInt8
 from std_srvs.srv import SetBool, Trigger
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError

@@ -9,10 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import RoomMap, read_place
 from floor_plans.occupancy_map import write_map
-from floor_plans.plan_grid import draw
-from floor_plans.regions import Regions
 from surveillance_operator.import_command import main
 
 pytestmark = pytest.mark.early
@@ -22,7 +20,7 @@ CONFIG = Path(__file__).parents[2] / 'config'
 
 def mapped(folder: Path, place: str, yaw: float = 0.0, resolution: float = 0.05) -> Path:
     """Draw one of the project's places as the map that a robot would have of it."""
-    grid = draw(read_place_file(CONFIG / f'{place}.yaml').plan, resolution)
+    grid = read_place(CONFIG / f'{place}.yaml').plan.grid(resolution)
     cells = grid.cells[::-1]
     write_map(folder / f'{place}.yaml', cells, resolution, (*grid.origin, yaw))
     return folder / f'{place}.yaml'
@@ -46,11 +44,11 @@ def test_the_seven_rooms_are_found_again(
     path = mapped(tmp_path, 'seven_rooms', yaw)
     assert main([str(path), '--labels', 'rooms.png']) == 0
     assert '7 doors' in capsys.readouterr().out
-    found = read_place_file(tmp_path / 'seven_rooms_place.yaml').plan
-    true = read_place_file(CONFIG / 'seven_rooms.yaml').plan
+    found = read_place(tmp_path / 'seven_rooms_place.yaml').plan
+    true = read_place(CONFIG / 'seven_rooms.yaml').plan
     assert found.map is not None
     assert len(found.place.rooms) == 7
-    regions = Regions(found)
+    regions = RoomMap(found)
     rooms = {}
     for name, (x, y, _) in true.place.positions.items():
         (own,) = found.map.to_world([(x - found.map.origin[0], y - found.map.origin[1])])
@@ -67,7 +65,7 @@ def test_the_seven_rooms_are_found_again(
 def test_an_office_of_forty_rooms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main([str(mapped(tmp_path, 'office', resolution=0.1))]) == 0
-    found = read_place_file(tmp_path / 'office_place.yaml').plan
+    found = read_place(tmp_path / 'office_place.yaml').plan
     rooms = [name for name in found.place.rooms if name.startswith('R')]
     assert 40 <= len(rooms) <= 42  # the lobby is no corridor
 
@@ -75,7 +73,7 @@ def test_an_office_of_forty_rooms(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_one_hall_is_one_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main([str(hall(tmp_path)), '--out', 'place.yaml']) == 0
-    assert list(read_place_file(tmp_path / 'place.yaml').place.rooms) == ['R1']
+    assert list(read_place(tmp_path / 'place.yaml').place.rooms) == ['R1']
 
 
 def test_the_end_of_what_is_known_is_no_wall(
@@ -87,7 +85,7 @@ def test_the_end_of_what_is_known_is_no_wall(
     pixels[70:109, 30:70] = 205
     cv2.imwrite(str(tmp_path / 'hall.png'), pixels)
     assert main([str(path), '--out', 'place.yaml']) == 0
-    assert list(read_place_file(tmp_path / 'place.yaml').place.rooms) == ['R1']
+    assert list(read_place(tmp_path / 'place.yaml').place.rooms) == ['R1']
 
 
 def test_what_cannot_be_imported_costs_one_line(
@@ -115,7 +113,7 @@ def test_a_picture_with_its_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     hall(tmp_path)
     assert main(['hall.png', '--resolution', '0.05', '--out', 'place.yaml']) == 0
-    assert read_place_file(tmp_path / 'place.yaml').plan.map is not None
+    assert read_place(tmp_path / 'place.yaml').plan.map is not None
 
 
 GRAPHS = {
@@ -148,7 +146,7 @@ def test_a_graph_of_another_program_is_a_place(
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).write_text(GRAPHS[name])
     assert main([name, '--out', 'place.yaml']) == 0
-    place = read_place_file(tmp_path / 'place.yaml').place
+    place = read_place(tmp_path / 'place.yaml').place
     third = 'lounge' if name == 'three.yaml' else 'R3'
     assert place.positions == {'R1': (-1, 2, 0), 'R2': (2, 2, 0), third: (2, 4, 0)}
     assert set(map(frozenset, place.doors.values())) == {

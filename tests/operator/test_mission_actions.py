@@ -12,7 +12,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from floor_plans import make_place
+from floor_plans.parameters import make_place
 from patrol_policy.decision import DecisionSettings
 from state_machines.exceptions import CallError
 from surveillance_behaviour.reasoner_node import Reasoner

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from surveillance_operator.mission_changes import changes, follow

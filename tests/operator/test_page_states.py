@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
-from floor_plans.zones import Zone
+from floor_plans import Grid, Zone
 from patrol_policy.world import Decision
 from surveillance_operator.mission_state import (
     MachineContainer,

@@ -12,9 +12,8 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
-from floor_plans.plan_grid import draw
 from surveillance_operator.page.server import Page
 from surveillance_operator.place_page.dropped_map import import_dropped
 from surveillance_operator.place_page.edit_command import editor_page, main
@@ -172,7 +171,7 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
     assert file.read_text() == SEVEN.read_text(), 'until it is saved'
     browser.click('#save')
     hand.said('written')
-    found = read_place_file(file)
+    found = read_place(file)
     assert found.plan.zones.slow['S1'].speed == 0.3
     assert set(found.place.rooms) == {'kitchen', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'}
     assert '# A point inside each place' in file.read_text()
@@ -210,7 +209,7 @@ def test_a_place_is_changed_without_a_mouse(browser: Viewer, page: Page, file: P
     hand.said('done again: R3')
     hand.chord(Keys.CONTROL, 's')
     hand.said('written')
-    assert read_place_file(file).rules.thresholds == {'R3': 600.0}
+    assert read_place(file).rules.thresholds == {'R3': 600.0}
 
 
 @in_browser
@@ -289,7 +288,7 @@ def test_a_map_dropped_on_the_page_becomes_a_place(
     browser: Viewer, open_page: Page, tmp_path: Path
 ) -> None:
     # As map_saver leaves it: a pgm, named by its path on the robot.
-    grid = draw(read_place_file(SEVEN).plan, 0.1)
+    grid = read_place(SEVEN).plan.grid(0.1)
     write_map(tmp_path / 'flat.yaml', grid.cells[::-1], 0.1, (*grid.origin, 0.0))
     with Image.open(tmp_path / 'flat.png') as image:
         image.save(tmp_path / 'flat.pgm')
@@ -323,7 +322,7 @@ def test_a_map_dropped_on_the_page_becomes_a_place(
     browser.until(lambda: 'is not saved' in browser.text('#import-said'), 20.0)
     browser.click('#save')
     hand.said('written: ')
-    assert 'kitchen' in read_place_file(folder / 'flat_place.yaml').plan.place.rooms
+    assert 'kitchen' in read_place(folder / 'flat_place.yaml').plan.place.rooms
     # What is there is not written over.
     drop_of(browser, tmp_path / 'flat.yaml', tmp_path / 'flat.pgm')
     browser.until(lambda: 'flat_place' in browser.text('#import-said'), 60.0)
@@ -336,7 +335,7 @@ def test_a_map_dropped_on_the_page_becomes_a_place(
 def test_a_chosen_picture_needs_its_scale(browser: Viewer, open_page: Page, tmp_path: Path) -> None:
     from selenium.webdriver.common.by import By
 
-    grid = draw(read_place_file(SEVEN).plan, 0.1)
+    grid = read_place(SEVEN).plan.grid(0.1)
     write_map(tmp_path / 'plan.yaml', grid.cells[::-1], 0.1, (*grid.origin, 0.0))
     browser.size(*PHONE)
     browser.driver.get(open_page.address)
@@ -404,7 +403,7 @@ def test_a_picture_is_taken_from_what_was_dropped(image: str, name: str, tmp_pat
     files = as_dropped(f'{image}\n{_REST}', name, m=tmp_path / 'm.png')
     out, said = import_dropped(files, tmp_path, 0.22)
     assert '2 rooms, 1 door' in said
-    assert len(read_place_file(out).plan.place.rooms) == 2
+    assert len(read_place(out).plan.place.rooms) == 2
 
 
 @pytest.mark.parametrize('form', ['image: {}\n', '"image": {}\n', 'image:\n  {}\n'])

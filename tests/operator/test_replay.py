@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import replay, report
@@ -174,7 +174,7 @@ def test_the_report_of_a_long_mission_counts_all_and_says_what_it_lists(run: Pat
     assert since is not None
     assert '1:00:00' < since[1] < '2:13:20'
     assert '<td>2:13:20</td><td>MOVE</td><td>shut</td>' in text  # by the mission's own time
-    plan = read_place_file(run / 'place.yaml').plan
+    plan = read_place(run / 'place.yaml').plan
     assert plan is not None
     assert 'the ways of the last 0.' in run_of(read(run / 'events.jsonl'), plan.place, '').summary
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from floor_plans import Regions, read_place_file
+from floor_plans import RoomMap, read_place
 from surveillance_operator.import_command import main
 
 HALF = """\
@@ -70,14 +70,14 @@ def test_a_building_becomes_a_place(
     said = capsys.readouterr().out
     assert '2 rooms, 1 door' in said
     assert 'level L1 as a map: clinic_place_map.yaml' in said
-    plan = read_place_file(tmp_path / 'clinic_place.yaml').plan
+    plan = read_place(tmp_path / 'clinic_place.yaml').plan
     # Open-RMF's frame: the pixel's row turned upwards.
     assert plan.place.positions == {'reception': (2, -2, 0), 'ward_2': (8, -3, 0)}
     assert plan.place.start == 'reception'
     assert plan.stations['reception'].pose == (2.0, -2.0, 0.0)
     door = plan.doors['L1_door']
     assert (door.x, door.y, door.width) == pytest.approx((5.0, -2.0, 1.0), abs=1e-3)
-    regions = Regions(plan)
+    regions = RoomMap(plan)
     assert regions.room_at(4.5, -0.5) == 'reception'
     assert regions.room_at(5.5, -0.5) == 'ward_2'
     assert regions.room_at(-1.0, 1.0) is None
@@ -100,7 +100,7 @@ def test_a_level_lies_over_the_reference_level(
     assert main([str(path), '--level', 'L3']) == 2
     assert "no level 'L3'" in capsys.readouterr().err
     assert main([str(path), '--level', 'L2']) == 0
-    place = read_place_file(tmp_path / 'clinic_place.yaml').place
+    place = read_place(tmp_path / 'clinic_place.yaml').place
     assert place.positions['ward_2'] == pytest.approx((8, -3, 0), abs=1e-3)
 
 
@@ -110,7 +110,7 @@ def test_a_wall_without_floors_closes_the_building(
     monkeypatch.chdir(tmp_path)
     text = level('L1', 0.0).split('    floors:')[0]
     assert main([str(building(tmp_path, text))]) == 0
-    plan = read_place_file(tmp_path / 'clinic_place.yaml').plan
+    plan = read_place(tmp_path / 'clinic_place.yaml').plan
     assert set(plan.place.rooms) == {'reception', 'ward_2'}
     assert plan.map is not None
     assert plan.map.grid.at(plan.map.grid.cells, -0.3, -2.0) == -1

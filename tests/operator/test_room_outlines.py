@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from surveillance_operator.room_outlines import RoomOutline, room_outlines
 
 WALL = 100

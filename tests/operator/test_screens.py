@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.watch import raster
 from surveillance_operator.watch.raster import CharacterCanvas, Viewport

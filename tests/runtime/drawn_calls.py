@@ -13,9 +13,9 @@ from unittest import mock
 
 import numpy as np
 
-from floor_plans import read_place_file
-from floor_plans.drawing import Canvas, Run, draw_place
-from floor_plans.zones import zones_from
+from floor_plans import read_place
+from floor_plans.drawing import Canvas, DrivenRun, draw_place
+from floor_plans.parameters import zones_from
 
 CONFIG = Path(__file__).parents[2] / 'config'
 RECORDS = Path(__file__).with_name('drawn')
@@ -87,9 +87,9 @@ class Recorded(Canvas):
             self.note('trace', colour, self._points(each), f'{width:.2f}', opacity)
 
 
-def recorded(name: str, run: Run | None) -> list[str]:
+def recorded(name: str, run: DrivenRun | None) -> list[str]:
     """Return what the picture of a place is drawn of."""
-    plan = read_place_file(CONFIG / f'{name}.yaml').plan
+    plan = read_place(CONFIG / f'{name}.yaml').plan
     assert plan is not None
     zones = zones_from(
         {
@@ -110,7 +110,7 @@ def recorded(name: str, run: Run | None) -> list[str]:
     return made[0].calls
 
 
-RUN = Run(
+RUN = DrivenRun(
     driven=[[(5.0, 10.0), (10.0, 8.0), (12.0, 8.0)]],
     planned=[[(5.0, 10.0), (12.0, 8.5)]],
     failures=[(10.0, 6.0), (4.0, 9.0)],
@@ -121,7 +121,7 @@ RUN = Run(
     summary='a long day',
 )
 HURRIED = replace(RUN, threshold=300.0, planned=(), failures=(), waits={'R1': 200.0, 'E': 299.0})
-PICTURES: dict[str, tuple[str, Run | None]] = {
+PICTURES: dict[str, tuple[str, DrivenRun | None]] = {
     'patrol_world': ('patrol_world', None),
     'seven_rooms': ('seven_rooms', None),
     'seven_rooms_run': ('seven_rooms', RUN),

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from floor_plans import Regions, read_place_file
+from floor_plans import RoomMap, read_place
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 
 CONFIG = Path(__file__).parents[2] / 'config'
@@ -129,7 +129,7 @@ def flat(described: dict[str, Any]) -> dict[str, str]:
 
 def recorded() -> list[str]:
     """Return what each change says, and what it changes."""
-    plan = read_place_file(CONFIG / 'seven_rooms.yaml').plan
+    plan = read_place(CONFIG / 'seven_rooms.yaml').plan
     assert plan is not None
     text = (CONFIG / 'seven_rooms.yaml').read_text('utf-8')
     parameters = yaml.safe_load(text)['/**']['ros__parameters']
@@ -138,7 +138,7 @@ def recorded() -> list[str]:
         before = {k: v for k, v in {**parameters, **more}.items() if v is not None}
         described = copy.deepcopy(before)
         changed_plan = type(plan).from_parameters(described) if more else plan
-        regions = Regions(changed_plan)
+        regions = RoomMap(changed_plan)
         for name, fields in changes:
             draft = Draft(copy.deepcopy(before), {}, changed_plan, regions, 0.22)
             lines.append(f'{name} {fields}')

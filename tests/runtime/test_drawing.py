@@ -12,11 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from floor_plans import read_place_file
-from floor_plans.drawing import Canvas, Run, _between, _dashes, blend, draw_place
-from floor_plans.floor_plan import FloorPlan
-from floor_plans.regions import Regions
-from floor_plans.zones import zones_from
+from floor_plans import FloorPlan, RoomMap, read_place
+from floor_plans.drawing import (
+    Canvas,
+    DrivenRun,
+    _between,
+    _dashes,
+    blend,
+    draw_place,
+)
+from floor_plans.parameters import zones_from
 
 from . import drawn_calls
 
@@ -73,7 +78,7 @@ def middle(box: Box) -> tuple[float, float]:
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
 
 
-def drawn(plan: FloorPlan, monkeypatch: pytest.MonkeyPatch, run: Run | None = None) -> Drawn:
+def drawn(plan: FloorPlan, monkeypatch: pytest.MonkeyPatch, run: DrivenRun | None = None) -> Drawn:
     made: list[Drawn] = []
 
     def canvas(*where: Any) -> Drawn:
@@ -87,7 +92,7 @@ def drawn(plan: FloorPlan, monkeypatch: pytest.MonkeyPatch, run: Run | None = No
 
 @pytest.fixture(params=['seven_rooms', 'patrol_world'])
 def plan(request: pytest.FixtureRequest) -> FloorPlan:
-    plan = read_place_file(CONFIG / f'{request.param}.yaml').plan
+    plan = read_place(CONFIG / f'{request.param}.yaml').plan
     assert plan is not None
     return plan
 
@@ -143,7 +148,7 @@ def test_the_bar_is_as_long_as_it_says(plan: FloorPlan, monkeypatch: pytest.Monk
 def test_a_leaf_opens_into_the_room_with_fewer_doors_and_its_name_is_across(
     plan: FloorPlan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    canvas, regions = drawn(plan, monkeypatch), Regions(plan)
+    canvas, regions = drawn(plan, monkeypatch), RoomMap(plan)
     way = {text: canvas.where(text) for text, *_ in canvas.texts if text in plan.doors}
     assert way.keys() == plan.doors.keys()
     leaves = [points for points, colour in canvas.lines if colour == '#b08a57']
@@ -172,7 +177,7 @@ def test_a_leaf_opens_into_the_room_with_fewer_doors_and_its_name_is_across(
 def test_walls_leave_doorways_as_wide_as_they_are_and_corners_are_filled(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    plan = read_place_file(CONFIG / 'seven_rooms.yaml').plan
+    plan = read_place(CONFIG / 'seven_rooms.yaml').plan
     assert plan is not None
     canvas = drawn(plan, monkeypatch)
     walls = [np.array(points) for points, colour in canvas.polygons if colour == '#3a4350']
@@ -198,7 +203,7 @@ def test_walls_leave_doorways_as_wide_as_they_are_and_corners_are_filled(
 def test_a_marker_hangs_before_its_wall_with_its_number_beside_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    plan = read_place_file(CONFIG / 'patrol_world.yaml').plan
+    plan = read_place(CONFIG / 'patrol_world.yaml').plan
     assert plan is not None
     canvas = drawn(plan, monkeypatch)
     assert plan.markers
@@ -224,7 +229,7 @@ def test_a_marker_hangs_before_its_wall_with_its_number_beside_it(
 
 
 def test_zones_a_station_failures_and_charges_are_marked(monkeypatch: pytest.MonkeyPatch) -> None:
-    plan = read_place_file(CONFIG / 'seven_rooms.yaml').plan
+    plan = read_place(CONFIG / 'seven_rooms.yaml').plan
     assert plan is not None
     wet = [8.0, 3.0, 9.0, 3.0, 9.0, 4.0, 8.0, 4.0]
     zones = zones_from(
@@ -234,7 +239,7 @@ def test_zones_a_station_failures_and_charges_are_marked(monkeypatch: pytest.Mon
         }
     )
     plan = replace(plan, zones=zones)
-    run = Run(
+    run = DrivenRun(
         driven=[[(5.0, 10.0), (10.0, 8.0)]],
         failures=[(10.0, 6.0)],
         recharges={'E': 3, 'R1': 0},
@@ -278,10 +283,10 @@ def test_zones_a_station_failures_and_charges_are_marked(monkeypatch: pytest.Mon
 def test_the_waits_are_bars_in_order_with_the_threshold_across(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    plan = read_place_file(CONFIG / 'seven_rooms.yaml').plan
+    plan = read_place(CONFIG / 'seven_rooms.yaml').plan
     assert plan is not None
     waits = {'R2': 50.0, 'R1': 200.0, 'C1': 0.0, 'R3': 100.0}
-    run = Run(threshold=80.0, waits=waits, visits={'R1': 7})
+    run = DrivenRun(threshold=80.0, waits=waits, visits={'R1': 7})
     canvas = drawn(plan, monkeypatch, run)
     right = canvas.at((plan.bounds[2], 0.0))[0]
     panel = {text: box for text, box, _ in canvas.texts if box[0] > right}

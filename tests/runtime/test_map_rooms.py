@@ -10,11 +10,18 @@ import cv2
 import numpy as np
 import pytest
 
-from floor_plans import FloorPlan, Regions, check_passable
-from floor_plans.map_rooms import Segmentation, joining, openings, proposal, propose
+from floor_plans import FloorPlan, Grid, RoomMap
+from floor_plans.map_rooms import (
+    Segmentation,
+    joining,
+    openings,
+    proposal,
+    propose,
+)
 from floor_plans.map_rooms.segmentation import spread
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans.occupancy_grid import distance_to
 from floor_plans.occupancy_map import OccupancyMap
+from floor_plans.room_map import check_passable
 
 from . import proposed_places
 
@@ -41,7 +48,7 @@ def proposed(
     monkeypatch.setattr(proposal, 'segment', found)
     parameters = propose(building, RADIUS).parameters
     plan = FloorPlan.from_parameters(parameters, building)
-    Regions(plan)
+    RoomMap(plan)
     check_passable(plan, RADIUS)
     return plan
 
@@ -68,7 +75,7 @@ def test_gaps_beside_a_door_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     labels[:, 80:] = 2
     plan = proposed(building, labels, monkeypatch)
     assert list(plan.doors) == ['D1']
-    assert Regions(plan).room_at(7.0, 1.0) == 'R2'
+    assert RoomMap(plan).room_at(7.0, 1.0) == 'R2'
 
 
 def test_a_door_reaches_equally_far_from_its_middle(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from floor_plans import PlaceFile, Regions, read_place_file
+from floor_plans import PlaceFile, RoomMap, read_place
 from floor_plans.drawing import draw_place
 from floor_plans.occupancy_map import read_map, write_map
 from floor_plans.writing import copy_place, updated_text
@@ -137,14 +137,14 @@ def test_damaged_pictures_are_refused(tmp_path: Path) -> None:
 def test_a_map_given_as_a_place_names_the_command_that_makes_one(tmp_path: Path) -> None:
     for path in (written(tmp_path), tmp_path / 'building.pgm'):
         with pytest.raises(FileError) as caught:
-            read_place_file(path)
+            read_place(path)
         assert f'`python3 launch.py import {path}`' in str(caught.value)
 
 
 def test_a_place_with_a_map_knows_its_rooms(tmp_path: Path) -> None:
     written(tmp_path)
-    plan = read_place_file(place(tmp_path)).plan
-    regions = Regions(plan)
+    plan = read_place(place(tmp_path)).plan
+    regions = RoomMap(plan)
     assert [regions.room_at(x, 3.5) for x in (0.6, 3.0, 3.5, 6.0)] == ['A', 'A', 'B', 'B']
     assert regions.room_at(0.8, 3.9) == 'A'  # below the table
     assert [station.pose for station in plan.stations.values()] == [(1.5, 3.0, 0.0)]
@@ -169,7 +169,7 @@ def test_a_place_that_does_not_fit_its_map_is_refused(
 ) -> None:
     written(tmp_path)
     with pytest.raises(FileError) as caught:
-        read_place_file(place(tmp_path, **change))
+        read_place(place(tmp_path, **change))
     assert message in str(caught.value)
 
 
@@ -177,16 +177,16 @@ def test_a_picture_with_a_scale_is_a_map(tmp_path: Path) -> None:
     written(tmp_path, ending='png')
     path = place(tmp_path, '    map_file_resolution: 0.05\n')
     path.write_text(path.read_text().replace('building.yaml', 'building.png'))
-    assert read_place_file(path).plan.map is not None
+    assert read_place(path).plan.map is not None
     path.write_text(path.read_text().replace('map_file_resolution', '#'))
     with pytest.raises(FileError, match='says nothing of its scale'):
-        read_place_file(path)
+        read_place(path)
 
 
 def test_a_place_needs_neither_walls_nor_map(tmp_path: Path) -> None:
     path = place(tmp_path)
     path.write_text(path.read_text().replace('map_file', '#'))
-    file = read_place_file(path)
+    file = read_place(path)
     assert isinstance(file, PlaceFile)
     assert not file.plan.is_enclosed
     assert draw_place(file.plan, 'Two rooms', '').size[0] > 500
@@ -203,7 +203,7 @@ def test_a_copy_holds_its_map(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace('[3.225, 2.25, 1.5707963, 1.0]', door))
     copy_place(path, tmp_path / 'run' / 'place.yaml')
     (tmp_path / 'building.pgm').unlink()
-    copied = read_place_file(tmp_path / 'run' / 'place.yaml').plan
+    copied = read_place(tmp_path / 'run' / 'place.yaml').plan
     assert copied.map is not None
     assert copied.map.origin == (1.0, 2.0, 0.35)
     assert (copied.map.cells == turned.cells).all()
@@ -234,4 +234,4 @@ def test_a_change_keeps_the_comments(tmp_path: Path) -> None:
     parameters['station'] = [1.0, 2.0, 0.0]
     path.write_text(updated_text(before, parameters))
     assert '0.9]  # wide' in path.read_text()
-    assert next(iter(read_place_file(path).plan.stations.values())).pose == (1.0, 2.0, 0.0)
+    assert next(iter(read_place(path).plan.stations.values())).pose == (1.0, 2.0, 0.0)

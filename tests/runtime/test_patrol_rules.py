@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from floor_plans import read_place_file
-from floor_plans.patrol_rules import patrol_rules
-from floor_plans.rooms import PlaceError
+from floor_plans import PlaceError, read_place
+from floor_plans.parameters import patrol_rules
 from strict_files.files import FileError
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
@@ -26,14 +25,14 @@ def test_a_file_says_what_differs_from_place_to_place(tmp_path: Path) -> None:
     time_zone: Europe/Rome
 """
     path.write_text(CONFIG.read_text(encoding='utf-8') + more, encoding='utf-8')
-    rules = read_place_file(path).rules
+    rules = read_place(path).rules
     assert rules.thresholds == {'R1': 60.0, 'R4': 3600.0}
     assert rules.exploration == {'C1': 0.0}
     assert rules.calendar.keep_out == {'R2'}
     assert set(rules.calendar.hours) == {'R3'}
     path.write_text(path.read_text(encoding='utf-8').replace('R4: 3600', 'R9: 3600'))
     with pytest.raises(FileError, match=r"place.yaml:\d+: thresholds.R9: no room 'R9'"):
-        read_place_file(path)
+        read_place(path)
 
 
 @pytest.mark.parametrize(

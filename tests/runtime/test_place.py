@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from floor_plans import Place, PlaceError, make_place, read_place_file
+from floor_plans import Place, PlaceError, read_place
+from floor_plans.parameters import make_place
 from strict_files.files import FileError
 from tests.seven_rooms import SEVEN_ROOMS
 
@@ -150,7 +151,7 @@ def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, word
     assert old in GOOD
     path.write_text(GOOD.replace(old, new, 1))
     with pytest.raises(FileError) as refusal:
-        read_place_file(path)
+        read_place(path)
     assert str(refusal.value).startswith(str(path))
     assert words in str(refusal.value)
     assert '\n' not in str(refusal.value)
@@ -158,24 +159,24 @@ def test_errors_of_a_file_name_the_line(tmp_path: Path, old: str, new: str, word
 
 def test_files_that_are_not_there_or_not_text(tmp_path: Path) -> None:
     with pytest.raises(FileError, match='No such file'):
-        read_place_file(tmp_path / 'none.yaml')
+        read_place(tmp_path / 'none.yaml')
     binary = tmp_path / 'binary.yaml'
     binary.write_bytes(b'\xff\xfe\x00')
     with pytest.raises(FileError, match='not UTF-8'):
-        read_place_file(binary)
+        read_place(binary)
 
 
 @pytest.mark.parametrize('name', ['seven_rooms', 'patrol_world', 'office'])
 def test_the_places_that_come_along_are_places(name: str) -> None:
     path = Path(__file__).parents[2] / 'config' / f'{name}.yaml'
-    place = read_place_file(path).place
+    place = read_place(path).place
     assert place.reachable(place.start) == set(place.rooms)
 
 
 def problem_of(path: Path) -> str:
     """Return what is wrong with a place's file; empty when nothing is."""
     try:
-        read_place_file(path)
+        read_place(path)
     except FileError as error:
         return str(error)
     return ''

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.editor import PlaceEditor
 from floor_plans.map_rooms import propose
 from floor_plans.occupancy_map import read_map, write_map
-from floor_plans.plan_grid import draw
 from floor_plans.writing import format_place
 from strict_files.files import FileError
 
@@ -31,7 +30,7 @@ def typed(tmp_path: Path) -> PlaceEditor:
 @pytest.fixture
 def scanned(tmp_path: Path) -> PlaceEditor:
     """Provide the same place as a map, with the rooms that are proposed for it."""
-    grid = draw(read_place_file(SEVEN).plan)
+    grid = read_place(SEVEN).plan.grid()
     write_map(tmp_path / 'map.yaml', grid.cells[::-1], 0.05, (*grid.origin, 0.0))
     found = propose(read_map(tmp_path / 'map.yaml'), 0.22)
     text = format_place({'map_file': 'map.yaml', **found.parameters}, 'Made by a test.')
@@ -75,7 +74,7 @@ def test_a_room_is_cut_and_joined_again(kind: str, request: pytest.FixtureReques
     (door,) = place.rooms[fourth]
     assert room_at(editor, 15, 12) in place.doors[door], 'the doors go with their side'
     editor.save()
-    assert len(read_place_file(editor.path).place.rooms) == 8, 'as anybody reads it'
+    assert len(read_place(editor.path).place.rooms) == 8, 'as anybody reads it'
     first, second = (room_at(editor, x, 12) for x in (13, 15))
     editor.apply('join', {'first': first, 'second': second})
     after = editor.now.plan.place
@@ -104,7 +103,7 @@ def test_two_rooms_with_a_wall_between_become_one_through_the_opening(typed: Pla
     typed.apply('join', {'first': 'C1', 'second': 'R1'})
     assert room_at(typed, 10, 5) == room_at(typed, 10, 8) == 'C1'
     assert 'D1' not in typed.now.plan.doors
-    grid = draw(typed.now.plan)
+    grid = typed.now.plan.grid()
     assert grid.at(grid.free, 10.0, 6.5), 'the opening is still there'
     assert not grid.at(grid.free, 9.0, 6.5), 'and the wall beside it'
 
@@ -181,7 +180,7 @@ def test_what_somebody_else_wrote_is_not_overwritten(typed: PlaceEditor) -> None
     typed.apply('add_door', {'x': 12.4, 'y': 4.0})
     typed.save()
     assert '# a note' in typed.path.read_text()
-    plan = read_place_file(typed.path).plan
+    plan = read_place(typed.path).plan
     assert plan.markers['M1'].id == 7
     assert set(plan.place.doors['D8']) == {'R1', 'R2'}
 
@@ -202,7 +201,7 @@ def test_the_part_with_the_station_is_where_the_robot_charges(scanned: PlaceEdit
     scanned.apply('remove_station', {'room': with_station})
     assert scanned.now.plan.place.recharge_rooms == (other,)
     scanned.save()
-    assert read_place_file(scanned.path).plan.stations[other].pose[:2] == (8.5, 12.0)
+    assert read_place(scanned.path).plan.stations[other].pose[:2] == (8.5, 12.0)
 
 
 def test_each_change_says_and_changes_what_it_did() -> None:

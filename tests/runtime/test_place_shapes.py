@@ -10,10 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from floor_plans import PlaceError, boxes, read_place_file
-from floor_plans.editor.shapes import door_on_wall, fitted_door, free_point, sides_of
+from floor_plans import Door, Grid, PlaceError, RoomMap, Zone, Zones, read_place, shapes
+from floor_plans.editor.measures import (
+    door_on_wall,
+    fitted_door,
+    free_point,
+    sides_of,
+)
 from floor_plans.fleet import (
-    members_of,
     points_to_pass,
     problem_in_robot_name,
     robots_in_a_row,
@@ -21,16 +25,13 @@ from floor_plans.fleet import (
     wide_ways,
     with_points,
 )
-from floor_plans.floor_plan import Door
 from floor_plans.map_rooms.joining import elongation, half_width, joined
-from floor_plans.occupancy_grid import Grid, distance_to
-from floor_plans.plan_grid import draw
-from floor_plans.regions import Regions
-from floor_plans.zones import Zone, Zones
+from floor_plans.occupancy_grid import distance_to
+from floor_plans.parameters import members_of
 from surveillance_runtime.fleet_parts import members
 
 SEVEN_ROOMS = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
-PLAN = read_place_file(SEVEN_ROOMS).plan
+PLAN = read_place(SEVEN_ROOMS).plan
 BENT = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (3.0, 3.0), (3.0, 1.0), (0.0, 1.0))
 
 
@@ -100,12 +101,12 @@ def test_the_edges_of_zones_to_keep_out_of_are_told_in_the_robots_frame() -> Non
 
 
 def test_how_far_points_are_from_boxes_is_what_opencv_says() -> None:
-    some = boxes.boxes_around([((0.0, 0.0), (3.0, 4.0)), ((5.0, 1.0), (5.0, 3.0))], 0.2)
-    corners = boxes.corners(some)
+    some = shapes.boxes_around([((0.0, 0.0), (3.0, 4.0)), ((5.0, 1.0), (5.0, 3.0))], 0.2)
+    corners = shapes.corners(some)
     assert corners[1] == pytest.approx(np.array([[5.1, 1], [5.1, 3], [4.9, 3], [4.9, 1]]))
     rng = np.random.default_rng(5)
     points = rng.uniform((-2.0, -2.0), (7.0, 6.0), (200, 2))
-    away = boxes.distances(some, *points.T)
+    away = shapes.distances(some, *points.T)
     assert away.shape == (200, 2)
     for number, polygon in enumerate(corners.astype(np.float32)):
         for (x, y), gap in zip(points, away[:, number], strict=True):
@@ -296,12 +297,12 @@ def test_robots_in_a_row_stand_apart_from_each_other_and_from_walls_and_doors() 
     assert [each.name for each in robots] == [f'robot{n}' for n in range(1, 7)]
     assert robots[0].start == PLAN.start
     assert {each.start[2] for each in robots} == {PLAN.start[2]}
-    clearance = distance_to(draw(PLAN).occupied, draw(PLAN).resolution)
+    clearance = distance_to(PLAN.grid().occupied, PLAN.grid().resolution)
     for number, each in enumerate(robots):
         for other in robots[:number]:
             assert math.dist(each.start[:2], other.start[:2]) >= 2 * 0.22 + 0.6 - 1e-9
         if number:
-            assert clearance[draw(PLAN).cell_of(*each.start[:2])] >= 0.22 + 0.3
+            assert clearance[PLAN.grid().cell_of(*each.start[:2])] >= 0.22 + 0.3
             for door in PLAN.doors.values():
                 gap = math.dist(each.start[:2], (door.x, door.y))
                 assert gap >= door.width / 2 + 2 * 0.22
@@ -330,7 +331,7 @@ def test_a_run_has_the_robots_of_its_place_or_so_many_in_a_row(tmp_path: Path) -
 
 def test_where_robots_can_pass_each_other_is_measured() -> None:
     radius = 0.22
-    grid = draw(PLAN)
+    grid = PLAN.grid()
     clearance = distance_to(grid.occupied, grid.resolution)
     needed = 3 * radius + 0.4
     at = {name: clearance[grid.cell_of(x, y)] for name, (x, y, _) in PLAN.place.positions.items()}
@@ -345,7 +346,7 @@ def test_where_robots_can_pass_each_other_is_measured() -> None:
     found = points_to_pass(PLAN, radius)
     assert 0 < len(found) < len(at)
     assert set(found) == narrow_ones
-    rooms = Regions(PLAN)
+    rooms = RoomMap(PLAN)
     for name, (new_x, new_y) in found.items():
         assert rooms.room_at(new_x, new_y) == name
         assert clearance[grid.cell_of(new_x, new_y)] >= needed - grid.resolution

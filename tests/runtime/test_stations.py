@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from floor_plans import read_place_file
-from floor_plans.stations import Station, station_at, stations_of
+from floor_plans import Station, read_place
+from floor_plans.parameters import station_at, stations_of
 from strict_files.files import FileError
 
 PLACE = """\
@@ -33,7 +33,7 @@ def write(tmp_path: Path, old: str = '', new: str = '') -> Path:
 
 
 def test_each_recharge_room_has_its_station_and_the_robot_starts_at_its_own(tmp_path: Path) -> None:
-    plan = read_place_file(write(tmp_path)).plan
+    plan = read_place(write(tmp_path)).plan
     assert plan.stations == {
         'A': Station((0.5, 1.0, 3.1), rate=4.0),
         'B': Station((2.5, 3.0, 1.5), dock='bay'),
@@ -70,7 +70,7 @@ def test_what_is_wrong_with_a_station_is_told_with_its_line(
     tmp_path: Path, old: str, new: str, words: str
 ) -> None:
     with pytest.raises(FileError) as caught:
-        read_place_file(write(tmp_path, old, new))
+        read_place(write(tmp_path, old, new))
     assert words in str(caught.value)
 
 

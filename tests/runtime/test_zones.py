@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from floor_plans import read_place_file
+from floor_plans import PlaceError, read_place
 from floor_plans.filter_masks import write_filter_masks
 from floor_plans.occupancy_map import read_map
-from floor_plans.plan_grid import draw
-from floor_plans.rooms import PlaceError
-from floor_plans.zones import zones_from
+from floor_plans.parameters import zones_from
 from strict_files.files import FileError
 
 pytestmark = pytest.mark.unit
@@ -63,24 +61,24 @@ def test_a_zone_of_any_shape_knows_what_lies_in_it() -> None:
 def test_a_place_says_where_a_zone_does_not_fit(tmp_path: Path) -> None:
     file = place_with(tmp_path, keep_out_zones={'stairs': [9, 4, 11, 4, 11, 6, 9, 6]})
     with pytest.raises(FileError, match=r'R1: \(10, 5\) lies in the keep-out zone stairs'):
-        read_place_file(file)
+        read_place(file)
     file = place_with(tmp_path, keep_out_zones={'stairs': [9, 7.0, 11, 7.0, 11, 6, 9, 6]})
     with pytest.raises(FileError, match=r'doors.D1: a wall or a keep-out zone stands in it'):
-        read_place_file(file)
+        read_place(file)
     file = place_with(tmp_path, keep_out_zones={'a b': SQUARE})
     with pytest.raises(FileError, match="zone name 'a b': expected letters"):
-        read_place_file(file)
+        read_place(file)
 
 
 def test_nav2_reads_the_same_zones_from_the_masks(tmp_path: Path) -> None:
     file = place_with(tmp_path, keep_out_zones={'S': SQUARE}, slow_zones={'A': SHOP})
-    plan = read_place_file(file).plan
+    plan = read_place(file).plan
     keep_out, speed, parameters = write_filter_masks(plan, tmp_path / 'masks')
     servers = yaml.safe_load(parameters.read_text())
     info = servers['speed_costmap_filter_info_server']['ros__parameters']
     assert info['type'] == 2
     assert servers['keepout_costmap_filter_info_server']['ros__parameters']['type'] == 0
-    grid = draw(plan)
+    grid = plan.grid()
     barred, slow = read_map(keep_out).grid, read_map(speed).grid
     assert barred.cells.shape == grid.cells.shape
     assert barred.at(barred.cells, 9.0, 9.0) == 100

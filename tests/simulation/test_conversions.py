@@ -10,7 +10,6 @@ from builtin_interfaces.msg import Duration, Time
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from floor_plans import plan_grid
 from surveillance_controllers import conversions as received
 from surveillance_interfaces.srv import SetMarker
 from surveillance_runtime.conversions import map_message, pose_from, pose_message, seconds_of
@@ -53,7 +52,7 @@ def test_a_scan_comes_back_with_its_infinities() -> None:
 
 
 def test_a_map_comes_back() -> None:
-    grid = plan_grid.draw(two_rooms().plan)
+    grid = two_rooms().plan.grid()
     back = received.grid_from(map_message(grid, 'map', STAMP))
     assert (back.cells == grid.cells).all()
     assert back.resolution == pytest.approx(grid.resolution)

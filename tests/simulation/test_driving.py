@@ -9,7 +9,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from floor_plans import plan_grid
 from lidar_navigation import geometry
 from lidar_navigation.driving.driving import Drive, State
 from lidar_navigation.driving.navigator import Navigator
@@ -35,7 +34,7 @@ points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
 
 @pytest.fixture(scope='module')
 def planner() -> GridPlanner:
-    drawn = plan_grid.draw(PLAN)
+    drawn = PLAN.grid()
     return GridPlanner(drawn)
 
 
@@ -65,7 +64,7 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
 def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
     """Drive through places on cores alone; return the robot and how far it left its paths."""
     robot = Robot(world, rng=np.random.default_rng(seed))
-    drawn = plan_grid.draw(world.plan)
+    drawn = world.plan.grid()
     grid = drawn
     planner, navigator = GridPlanner(grid), Navigator()
     navigator.set_map(grid)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from surveillance_simulation.world.map_surface import MapSurface
 
 SIDE, ORIGIN = 0.1, (-1.0, 2.0)

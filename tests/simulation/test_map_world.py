@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from floor_plans import boxes
+from floor_plans import shapes
 from floor_plans.occupancy_map import write_map
-from floor_plans.plan_grid import draw
 from strict_files.yaml_file import read_yaml_file
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, scan
@@ -26,7 +25,7 @@ def worlds(tmp_path_factory: pytest.TempPathFactory) -> tuple[World, World]:
     """Return the seven rooms by their walls, and by a map that was drawn of them."""
     folder = tmp_path_factory.mktemp('map')
     by_walls = read_world(CONFIG / 'seven_rooms.yaml')
-    grid = draw(by_walls.plan, CELL)
+    grid = by_walls.plan.grid(CELL)
     write_map(folder / 'rooms.yaml', grid.cells[::-1], CELL, (*grid.origin, 0.0))
     given = dict(read_yaml_file(CONFIG / 'seven_rooms.yaml').values['/**']['ros__parameters'])
     del given['walls']
@@ -102,4 +101,4 @@ def test_a_place_without_walls_and_map_is_an_open_floor(worlds: tuple[World, Wor
     world = World.from_parameters(given)
     assert world.is_free(*by_walls.plan.start[:2], 0.5)
     assert np.isinf(scan(world, by_walls.plan.start, LidarModel(noise=0.0))).all()
-    assert boxes.distances(world.solid, 0.0, 0.0).shape == (0,)
+    assert shapes.distances(world.solid, 0.0, 0.0).shape == (0,)

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from floor_plans import PlaceError
-from floor_plans.floor_plan import Marker
+from floor_plans import Marker, PlaceError
 from marker_detection import CameraModel, FusedPositions, MarkerDetector, pose_of
 from surveillance_simulation.camera.model import LIGHTINGS, Camera, Conditions, expose, lit
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer

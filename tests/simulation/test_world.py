@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import regular_places
-from floor_plans import occupancy_grid, plan_grid, writing
-from floor_plans.floor_plan import Marker, PlaceError
+from floor_plans import Marker, PlaceError, occupancy_grid, writing
 from strict_files.files import FileError
 from surveillance_simulation.world.world import World, read_world
 
@@ -169,7 +168,7 @@ def test_an_error_in_a_file_names_file_and_line(tmp_path) -> None:
 
 def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
     plan = two_rooms().plan
-    grid = plan_grid.draw(plan)
+    grid = plan.grid()
     assert grid.cells[grid.cell_of(1.0, 1.0)] == occupancy_grid.FREE
     assert grid.cells[grid.cell_of(3.0, 1.0)] == occupancy_grid.FREE
     assert grid.cells[grid.cell_of(3.0, 0.2)] == occupancy_grid.OCCUPIED
@@ -178,7 +177,7 @@ def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
 
 def test_free_cells_of_the_map_are_free_in_the_world() -> None:
     world = read_world(CONFIG / 'seven_rooms.yaml')
-    grid = plan_grid.draw(world.plan)
+    grid = world.plan.grid()
     rows, columns = np.nonzero(grid.cells == occupancy_grid.FREE)
     for row, column in list(zip(rows, columns, strict=True))[::97]:
         assert world.clearance(*grid.centre_of(int(row), int(column))) >= grid.resolution / 2 - 1e-9

@@ -14,7 +14,7 @@ from floor_plans.fleet import FleetMember, members_of
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_map import is_map_description, is_picture
 from floor_plans.patrol_rules import PatrolRules, patrol_rules
-from floor_plans.regions import ROBOT_RADIUS, Regions, check_passable
+from floor_plans.room_map import ROBOT_RADIUS, RoomMap, check_passable
 from floor_plans.rooms import (
     GEOMETRY_KEYS,
     PATROL_KEYS,
@@ -45,7 +45,7 @@ class PlaceFile:
     robots: tuple[FleetMember, ...] = ()
 
 
-def read_place_file(
+def read_place(
     path: str | Path, *, radius: float = ROBOT_RADIUS, reserved: Collection[str] = ()
 ) -> PlaceFile:
     """Read a place's file and check all that it says, also that the robot fits through the doors.
@@ -129,6 +129,6 @@ def checked_plan(parameters: Mapping[str, Any], radius: float = ROBOT_RADIUS) ->
         PlaceError: What is described is no sound place.
     """
     plan = FloorPlan.from_parameters(parameters)
-    Regions(plan)
+    RoomMap(plan)
     check_passable(plan, radius)
     return plan

@@ -1,9 +1,9 @@
 """Drawing of a place: its rooms, walls, doors, markers and graph, and a run through it.
 
 The picture is drawn from the floor plan alone; what a run added (the driven ways, how long each
-place waited) comes as `Run`. A `Canvas` draws in metres on a plane with y upwards, with smooth
-edges: everything is drawn at a multiple of the picture's size and averaged down at the end. Lengths
-named `points` are pixels of the finished picture.
+place waited) comes as `DrivenRun`. A `Canvas` draws in metres on a plane with y upwards, with
+smooth edges: everything is drawn at a multiple of the picture's size and averaged down at the end.
+Lengths named `points` are pixels of the finished picture.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
-from floor_plans import boxes
-from floor_plans.floor_plan import WALL_THICKNESS, Door, FloorPlan, Marker, Point
-from floor_plans.regions import Regions
+from floor_plans import shapes
+from floor_plans.floor_plan import Door, FloorPlan, Marker
+from floor_plans.room_map import RoomMap
+from floor_plans.shapes import WALL_THICKNESS, Point
 
 _PAPER, _INK, _SOFT = '#fbfaf7', '#2f3742', '#7d8794'
 _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
@@ -35,7 +36,7 @@ _FINE = 3
 
 
 @dataclass(frozen=True)
-class Run:
+class DrivenRun:
     """What a run adds to the picture of its place.
 
     Attributes:
@@ -59,7 +60,9 @@ class Run:
     summary: str = ''
 
 
-def draw_place(plan: FloorPlan, title: str, facts: str, run: Run | None = None) -> Image.Image:
+def draw_place(
+    plan: FloorPlan, title: str, facts: str, run: DrivenRun | None = None
+) -> Image.Image:
     """Return the picture of a place.
 
     Args:
@@ -101,12 +104,12 @@ def draw_place(plan: FloorPlan, title: str, facts: str, run: Run | None = None) 
 class _Picture:
     def __init__(self, canvas: Canvas, plan: FloorPlan) -> None:
         self._canvas = canvas
-        self._regions = Regions(plan)
+        self._regions = RoomMap(plan)
         self._plan = plan
         self._place = plan.place
         self._size = min(15.0, max(9.0, canvas.scale / 3.4))
 
-    def floors(self, run: Run | None) -> None:
+    def floors(self, run: DrivenRun | None) -> None:
         if not self._plan.is_enclosed:
             return  # where a room ends is not known
         grid, masks = self._regions.grid, self._regions.masks()
@@ -166,7 +169,7 @@ class _Picture:
                 thicker = cv2.dilate(occupied, np.ones((reach, reach), np.uint8))
                 occupied = np.asarray(thicker, dtype=np.uint8)
             self._canvas.raster(occupied, grid.origin, grid.resolution, [_WALL])
-        solid = boxes.boxes_around(self._plan.wall_pieces(), WALL_THICKNESS)
+        solid = shapes.boxes_around(self._plan.wall_pieces(), WALL_THICKNESS)
         solid[:, 5] = max(WALL_THICKNESS / 2, 1.6 / self._canvas.scale)
         jambs = {end for door in self._plan.doors.values() for end in door.ends}
         for box, ends in zip(solid, self._plan.wall_pieces(), strict=True):
@@ -174,12 +177,12 @@ class _Picture:
             grown = box.copy()
             if not any(math.dist(end, jamb) < 1e-3 for end in ends for jamb in jambs):
                 grown[4] += box[5]
-            self._canvas.polygon(boxes.corners(grown[None])[0].tolist(), _WALL)
+            self._canvas.polygon(shapes.corners(grown[None])[0].tolist(), _WALL)
         for wall in self._plan.walls.values():
             for end in (wall.start, wall.end):
                 half = float(solid[0, 5])
                 corner = np.array([[*end, 1.0, 0.0, half, half]])
-                self._canvas.polygon(boxes.corners(corner)[0].tolist(), _WALL)
+                self._canvas.polygon(shapes.corners(corner)[0].tolist(), _WALL)
 
     def doors(self) -> None:
         for door in self._plan.doors.values():
@@ -250,7 +253,7 @@ class _Picture:
             # Below the sign of the place, which may stand at the same point.
             self._bolt(*self._canvas.at((x, y - (radius + self._size * 1.5) / self._canvas.scale)))
 
-    def failures(self, run: Run) -> None:
+    def failures(self, run: DrivenRun) -> None:
         for x, y in run.failures:
             self._cross(*self._canvas.at((x, y)))
 
@@ -268,7 +271,7 @@ class _Picture:
         west, north = self._canvas.at((0.0, 0.0))
         return (x - west) / self._canvas.scale, (north - y) / self._canvas.scale
 
-    def recharges(self, run: Run) -> None:
+    def recharges(self, run: DrivenRun) -> None:
         """Write beside each station's sign how often the robot charged there."""
         for room, count in run.recharges.items():
             if count and room in self._plan.stations:
@@ -292,7 +295,7 @@ class _Picture:
             colour = _SIGN_HOME if name in self._place.recharge_rooms else _SIGN
             self._canvas.pill(self._canvas.at((x, y)), name, self._size, colour)
 
-    def legend(self, run: Run | None) -> None:
+    def legend(self, run: DrivenRun | None) -> None:
         canvas = self._canvas
         y = canvas.size[1] - 34.0
         length = 1.0 if canvas.scale > 90 else 2.0 if canvas.scale > 30 else 5.0
@@ -349,7 +352,7 @@ class _Picture:
         for start in (0, 8, 16) if dashed else (0, 6, 12, 18):
             self._canvas.box(x + start, y - 1.2, x + start + 6, y + 1.2, colour)
 
-    def waits(self, run: Run) -> None:
+    def waits(self, run: DrivenRun) -> None:
         canvas = self._canvas
         left = canvas.at((self._plan.bounds[2], 0.0))[0] + 34.0
         top, bottom = 96.0, canvas.size[1] - 60.0

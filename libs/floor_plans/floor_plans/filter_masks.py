@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_grid import OCCUPIED, Grid
-from floor_plans.plan_grid import draw, zone_cells
 from strict_files.files import FileError, in_one_line
 
 KEEP_OUT, SPEED = 'keepout', 'speed'
@@ -28,7 +27,7 @@ def keep_out_mask(plan: FloorPlan, grid: Grid) -> NDArray[np.uint8]:
     """Return 100 for the cells of keep-out zones, 0 for all others; row 0 in the south."""
     mask = np.zeros(grid.cells.shape, np.uint8)
     for zone in plan.zones.keep_out.values():
-        mask[zone_cells(grid, zone)] = OCCUPIED
+        mask[zone.cells_on(grid)] = OCCUPIED
     return mask
 
 
@@ -41,7 +40,7 @@ def speed_mask(plan: FloorPlan, grid: Grid) -> tuple[NDArray[np.uint8], float]:
     unit = max(speeds.values(), default=1.0) / OCCUPIED
     mask = np.zeros(grid.cells.shape, np.uint8)
     for name, zone in sorted(plan.zones.slow.items(), key=lambda each: -speeds[each[0]]):
-        mask[zone_cells(grid, zone)] = max(1, int(speeds[name] / unit + 1e-6))
+        mask[zone.cells_on(grid)] = max(1, int(speeds[name] / unit + 1e-6))
     return mask, unit
 
 
@@ -58,7 +57,7 @@ def write_filter_masks(plan: FloorPlan, folder: Path) -> list[Path]:
     Raises:
         FileError: They cannot be written.
     """
-    grid = draw(plan)
+    grid = plan.grid()
     written = []
     parameters = ''
     try:

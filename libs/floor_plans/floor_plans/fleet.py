@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_grid import Grid, distance_to
-from floor_plans.plan_grid import draw
-from floor_plans.regions import Regions
-from floor_plans.rooms import PlaceError, Pose, nested
+from floor_plans.room_map import RoomMap
+from floor_plans.rooms import PlaceError, nested
+from floor_plans.shapes import Pose
 from strict_files.suggestions import nearest
 
 MOST_ROBOTS = 100
@@ -119,7 +119,7 @@ def robots_in_a_row(plan: FloorPlan, count: int, radius: float) -> tuple[FleetMe
     Raises:
         PlaceError: There is no room for so many.
     """
-    regions = Regions(plan)
+    regions = RoomMap(plan)
     grid, clearance = _clearance(plan)
     x0, y0, yaw = plan.start
     room, pitch = regions.room_at(x0, y0), 2.0 * radius + _APART
@@ -151,7 +151,7 @@ def robots_in_a_row(plan: FloorPlan, count: int, radius: float) -> tuple[FleetMe
 
 def _clearance(plan: FloorPlan) -> tuple[Grid, NDArray[np.float32]]:
     """Return the place as a grid, and the distance of each cell to the next wall, metres."""
-    grid = draw(plan)
+    grid = plan.grid()
     return grid, distance_to(~grid.free, grid.resolution)
 
 
@@ -184,7 +184,7 @@ def points_to_pass(plan: FloorPlan, radius: float) -> dict[str, tuple[float, flo
     if not plan.is_enclosed or len(wide) == len(plan.place.positions):
         return {}
     grid, clearance = _clearance(plan)
-    regions = Regions(plan)
+    regions = RoomMap(plan)
     found = {}
     for name, (x, y, _) in plan.place.positions.items():
         if name in wide:
@@ -232,6 +232,6 @@ def _pose(where: tuple[str, ...], value: Any, plan: FloorPlan) -> Pose:
     if not numbers or len(value) != 3:
         raise PlaceError(where, f'expected [x, y, yaw] in metres and rad, got {value!r}')
     x, y, yaw = map(float, value)
-    if plan.is_enclosed and Regions(plan).room_at(x, y) is None:
+    if plan.is_enclosed and RoomMap(plan).room_at(x, y) is None:
         raise PlaceError(where, f'({x:g}, {y:g}) lies in no room: expected a point in one')
     return x, y, yaw

@@ -11,11 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from floor_plans.rooms import Place, PlaceError, Pose, place_from
+from floor_plans.occupancy_grid import UNKNOWN, Grid, empty_around, outlines, walled_off
+from floor_plans.rooms import Place, PlaceError, place_from
+from floor_plans.shapes import WALL_HEIGHT, WALL_THICKNESS, Point, Pose, Segment
 from floor_plans.stations import Station, stations_of
 from floor_plans.zones import NO_ZONES, Zones, zones_from
 from strict_files.files import FileError
@@ -24,12 +27,6 @@ from strict_files.yaml_file import KeyPath
 if TYPE_CHECKING:
     from floor_plans.occupancy_map import OccupancyMap
 
-Point = tuple[float, float]
-Segment = tuple[float, float, float, float]
-"""A line from x1, y1 to x2, y2, metres."""
-
-WALL_THICKNESS = 0.1
-WALL_HEIGHT = 2.5
 FURTHEST = 1000.0
 """How far from the origin a wall may reach, metres."""
 LARGEST = 100_000.0
@@ -172,6 +169,51 @@ class FloorPlan:
             return self.stations[self.place.start].pose
         x, y, _ = self.place.positions[self.place.start]
         return x, y, 0.0
+
+    def grid(self, resolution: float = 0.05, margin: float = 0.5) -> Grid:
+        """Return the place's occupancy grid, its doors open.
+
+        A cell is occupied when its centre lies within half a cell of a wall, unknown when no place
+        reaches it, else free. A place with a map has the map's cells, with its own walls added; one
+        with neither is free all over.
+
+        Args:
+            resolution: Side of a cell, metres; that of a map is the map's own.
+            margin: Width of the unknown border around the walls, metres.
+        """
+        solid = self.walled(self.wall_pieces(), resolution, margin)
+        if self.map is not None or not self.walls:
+            return solid
+        import cv2
+
+        reached = cv2.connectedComponents(solid.free.astype(np.uint8), connectivity=4)[1]
+        inside = {reached[solid.cell_of(x, y)] for x, y, _ in self.place.positions.values()} - {0}
+        solid.cells[solid.free & ~np.isin(reached, list(inside))] = UNKNOWN
+        return solid
+
+    def walled(
+        self, lines: Sequence[tuple[Point, Point]], resolution: float = 0.05, margin: float = 0.5
+    ) -> Grid:
+        """Return a grid of the place on which walls stand along these lines alone.
+
+        All else is free, or as the place's map has it.
+        """
+        if self.map is not None:
+            return walled_off(self.map.grid, lines)
+        return walled_off(empty_around(self.bounds, resolution, margin), lines)
+
+    def solid_lines(self) -> list[tuple[Point, Point]]:
+        """Return the centre lines of all that stands in the place with its doors open, metres.
+
+        The walls' pieces, and the outlines of what its map shows.
+        """
+        lines = list(self.wall_pieces())
+        if self.map is not None:
+            for outline in outlines(self.map.grid, self.map.resolution):
+                for (x1, y1), (x2, y2) in pairwise(outline.tolist()):
+                    if (x1, y1) != (x2, y2):
+                        lines.append(((x1, y1), (x2, y2)))
+        return lines
 
     @property
     def is_enclosed(self) -> bool:

@@ -8,12 +8,16 @@ Cells are those of nav_msgs/OccupancyGrid: row 0 lies in the south, column 0 in 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from floor_plans import shapes
+from floor_plans.shapes import WALL_THICKNESS, Point
 
 FREE = 0
 OCCUPIED = 100
@@ -203,6 +207,45 @@ def with_walls(grid: Grid, lines: ArrayLike) -> Grid:
     cells = grid.cells.copy()
     cells[drawn_lines(grid, lines)] = OCCUPIED
     return Grid(cells, grid.resolution, grid.origin)
+
+
+def empty_around(box: Box, resolution: float, margin: float) -> Grid:
+    """Return a map on which all is free, so many metres wider than a box on each side."""
+    west, south, east, north = box
+    # Its corner falls on a multiple of the resolution: maps of one place line up.
+    x = math.floor((west - margin) / resolution) * resolution
+    y = math.floor((south - margin) / resolution) * resolution
+    columns = math.ceil((east + margin - x) / resolution)
+    rows = math.ceil((north + margin - y) / resolution)
+    return Grid(np.zeros((rows, columns), np.int8), resolution, (x, y))
+
+
+def walled_off(grid: Grid, lines: Sequence[tuple[Point, Point]]) -> Grid:
+    """Return the map with walls as thick as those of a place along lines, metres."""
+    cells = grid.cells.copy()
+    solid = shapes.boxes_around(lines, WALL_THICKNESS)
+    _paint(cells, grid.resolution, grid.origin, solid)
+    return Grid(cells, grid.resolution, grid.origin)
+
+
+def _paint(
+    cells: NDArray[np.int8], resolution: float, origin: tuple[float, float], solid: shapes.Array
+) -> None:
+    """Make the cells occupied that lie within half a cell of boxes."""
+    rows, columns = cells.shape
+    origin_x, origin_y = origin
+    reach = resolution / 2
+    for box, corners in zip(solid, shapes.corners(solid), strict=True):
+        low = np.floor((corners.min(axis=0) - reach - (origin_x, origin_y)) / resolution)
+        high = np.ceil((corners.max(axis=0) + reach - (origin_x, origin_y)) / resolution)
+        first_column, first_row = np.maximum(low.astype(int), 0)
+        last_column, last_row = np.minimum(high.astype(int), (columns, rows))
+        if first_column >= last_column or first_row >= last_row:
+            continue
+        x = origin_x + (np.arange(first_column, last_column) + 0.5) * resolution
+        y = origin_y + (np.arange(first_row, last_row) + 0.5) * resolution
+        inside = shapes.distances(box[None], x[None, :], y[:, None])[..., 0] < reach - 1e-9
+        cells[first_row:last_row, first_column:last_column][inside] = OCCUPIED
 
 
 def regions(free: NDArray[np.bool_]) -> NDArray[np.int32]:

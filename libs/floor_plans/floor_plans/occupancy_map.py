@@ -24,7 +24,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Grid, Points
+from floor_plans.occupancy_grid import (
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    Grid,
+    Points,
+)
 from strict_files.files import FileError, in_one_line, like_file, replace_text
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import YamlFile, read_yaml_file

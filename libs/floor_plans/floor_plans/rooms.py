@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from floor_plans.shapes import Position
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import KeyPath
 
@@ -32,10 +33,6 @@ PLACE_TABLES = (
 )
 """Those that hold an entry for each room, wall, door, marker, ...: `map.R1`, `map.R2`, ..."""
 _NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_-]*\Z')
-
-Position = tuple[float, float, float]
-Pose = tuple[float, float, float]
-"""x, y in metres, yaw in rad, world frame."""
 
 
 class PlaceError(ValueError):

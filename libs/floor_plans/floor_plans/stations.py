@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from floor_plans.rooms import PlaceError, Pose
+from floor_plans.rooms import PlaceError
+from floor_plans.shapes import Pose
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import KeyPath
 

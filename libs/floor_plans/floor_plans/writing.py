@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from floor_plans.description import read_place_file
+from floor_plans.description import read_place
 from floor_plans.occupancy_map import write_map
 from strict_files.files import FileError, in_one_line
 
@@ -139,7 +139,7 @@ def copy_place(source: Path, target: Path) -> None:
     """
     try:
         text = source.read_text('utf-8')
-        building = read_place_file(source).plan.map if 'map_file' in text else None
+        building = read_place(source).plan.map if 'map_file' in text else None
         if building is not None:
             copied = target.with_name(_MAP)
             write_map(copied, building.cells, building.resolution, building.origin)

@@ -10,12 +10,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from floor_plans.occupancy_grid import Grid, drawn_lines
 from floor_plans.rooms import ZONE_TABLES, PlaceError, problem_in_name
 
 Corner = tuple[float, float]
@@ -90,6 +91,19 @@ class Zone:
             share = np.arange(steps)[:, None] / steps
             found.append((1 - share) * start + share * end)
         return np.concatenate(found)
+
+    def cells_on(self, grid: Grid) -> NDArray[np.bool_]:
+        """Return its cells on a map: those whose centre lies inside, and those on its edge."""
+        corners = [*self.corners, self.corners[0]]
+        cells = drawn_lines(grid, [(*start, *end) for start, end in pairwise(corners)])
+        west, south, east, north = self.box
+        bottom, left = np.maximum(grid.cell_of(west, south), 0)
+        top, right = np.maximum(np.add(grid.cell_of(east, north), 1), 0)
+        window = cells[bottom:top, left:right]
+        if window.size:
+            inside = np.argwhere(np.ones_like(window)) + np.array([bottom, left])
+            window |= self.contains(grid.centres_of(inside)).reshape(window.shape)
+        return cells
 
 
 @dataclass(frozen=True)

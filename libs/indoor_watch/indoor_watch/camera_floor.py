@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.hung_markers import CameraView
 from indoor_watch.viewpoints import RANGE
 

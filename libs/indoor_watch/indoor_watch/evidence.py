@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 
 Points = NDArray[np.float64]
 

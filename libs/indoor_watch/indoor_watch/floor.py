@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 
 Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]

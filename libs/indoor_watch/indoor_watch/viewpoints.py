@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 
 Mask = NDArray[np.bool_]
 Spot = tuple[float, float]

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from indoor_watch.camera_floor import CameraFloor
 from indoor_watch.doors import Segment, read_door
 from indoor_watch.events import ELSEWHERE, Event, EventBook, EventState

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from floor_plans.occupancy_grid import Grid, drawn_lines
+from floor_plans import Grid
+from floor_plans.occupancy_grid import drawn_lines
 from indoor_watch.doors import Segment
 
 Mask = NDArray[np.bool_]

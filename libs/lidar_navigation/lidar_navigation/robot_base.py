@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from floor_plans.regions import ROBOT_RADIUS
+from floor_plans import ROBOT_RADIUS
 from strict_files.settings import parameter
 
 ROBOT_DECELERATION = 2.5

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from floor_plans.stations import AT_STATION
+from floor_plans.parameters import AT_STATION
 from patrol_policy.battery import Battery
 from patrol_policy.decision import QUIET, RECHARGE, REQUEST, DecisionSettings
 from patrol_policy.promises import Promise

@@ -15,8 +15,8 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool
 
-from floor_plans.patrol_rules import patrol_rules
-from floor_plans.stations import Station, stations_in
+from floor_plans import Station
+from floor_plans.parameters import patrol_rules, stations_in
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.promises import Promise
 from patrol_policy.world import Decision

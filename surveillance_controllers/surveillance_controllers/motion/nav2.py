@@ -24,7 +24,7 @@ from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
-from floor_plans.stations import station_at, stations_in
+from floor_plans.parameters import station_at, stations_in
 from lidar_navigation.geometry import (
     Points,
     angle_between,

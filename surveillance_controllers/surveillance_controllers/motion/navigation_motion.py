@@ -18,7 +18,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 
-from floor_plans.zones import zones_from
+from floor_plans.parameters import zones_from
 from lidar_navigation.driving.driving import TURNED, Drive, Spin, State
 from lidar_navigation.driving.navigator import Navigator
 from lidar_navigation.driving.path_following import DriveParameters, Velocity

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from floor_plans.floor_plan import Segment
+from floor_plans.shapes import Segment
 from state_machines import Interrupt
 from state_machines.ros import ServiceCaller
 from surveillance_controllers.map_knowledge import MapKnowledge, keep_up

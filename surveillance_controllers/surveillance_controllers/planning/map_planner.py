@@ -15,8 +15,8 @@ from nav_msgs.msg import OccupancyGrid
 from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import PointCloud2
 
-from floor_plans.occupancy_grid import Grid
-from floor_plans.zones import zones_from
+from floor_plans import Grid
+from floor_plans.parameters import zones_from
 from lidar_navigation.geometry import Points, Pose, point_of
 from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 from state_machines import Interrupt

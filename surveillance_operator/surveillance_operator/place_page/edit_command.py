@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from floor_plans import ROBOT_RADIUS
 from floor_plans.editor import PlaceEditor
-from floor_plans.regions import ROBOT_RADIUS
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page

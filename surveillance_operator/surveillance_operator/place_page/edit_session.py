@@ -16,8 +16,7 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from floor_plans.editor import PlaceEditor
-from floor_plans.patrol_rules import CLASSES
-from floor_plans.plan_grid import draw
+from floor_plans.parameters import CLASSES
 from surveillance_operator.page.server import Action
 
 _MOST_PIXELS = 1_500_000
@@ -208,7 +207,7 @@ def _picture(editor: PlaceEditor) -> dict[str, Any]:
     value = np.zeros(max([*names, int(labels.max()), 0]) + 1, np.uint8)
     for number, name in names.items():
         value[number] = _FIRST + order[name] % len(_COLOURS) if name in order else _FLOOR
-    open_grid = draw(plan) if plan.is_enclosed else grid
+    open_grid = plan.grid() if plan.is_enclosed else grid
     cells = np.where(open_grid.free, _FLOOR, _UNKNOWN).astype(np.uint8)
     same = open_grid.cells.shape == labels.shape and plan.is_enclosed
     if same:

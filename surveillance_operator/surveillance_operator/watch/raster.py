@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rich.segment import Segment
 from rich.style import Style
 
-from floor_plans.occupancy_grid import Box, Grid
+from floor_plans import Grid
+from floor_plans.occupancy_grid import Box
 from surveillance_operator.mission_state import Pose
 
 UNKNOWN, FREE, WALL, LINK, OLD_TRAIL, TRAIL, OPEN_DOOR, CLOSED_DOOR, OBSTACLE = range(9)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from floor_plans.regions import ROBOT_RADIUS
+from floor_plans import ROBOT_RADIUS
 from lidar_navigation.robot_base import ROBOT_DECELERATION, footprint
 from strict_files.settings import parameter, parameters
 from surveillance_runtime import parameter_checks

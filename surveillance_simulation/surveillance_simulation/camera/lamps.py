@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans.floor_plan import WALL_HEIGHT
+from floor_plans.shapes import WALL_HEIGHT
 from surveillance_simulation.camera.model import Array, Camera, Scene
 from surveillance_simulation.world.world import World
 

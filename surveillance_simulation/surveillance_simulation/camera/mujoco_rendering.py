@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans import boxes
-from floor_plans.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from floor_plans.plan_grid import solid_lines
+from floor_plans import Door, shapes
+from floor_plans.shapes import WALL_HEIGHT, WALL_THICKNESS
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.camera.scene import DOOR_HEIGHT, STATION_SIDE
@@ -132,7 +131,7 @@ def _model(world: World, camera: Camera, movers: Sequence[Thing]) -> Any:
     plaster = (textures.plaster() * world.wall_brightness).astype(np.uint8)
     _material(spec, 'plaster', plaster, mujoco.mjtTexture.mjTEXTURE_CUBE)
     _material(spec, 'leaf', textures.leaf(), mujoco.mjtTexture.mjTEXTURE_CUBE)
-    for start, end in solid_lines(world.plan):
+    for start, end in world.plan.solid_lines():
         _box(spec, start, end, 0.0, WALL_HEIGHT, 'plaster')
     for door in world.plan.doors.values():
         _door(spec, door, world)
@@ -190,7 +189,7 @@ def _box(
     material: str,
     thickness: float = WALL_THICKNESS,
 ) -> None:
-    x, y, cos, sin, along, across = boxes.boxes_around([(start, end)], thickness)[0]
+    x, y, cos, sin, along, across = shapes.boxes_around([(start, end)], thickness)[0]
     centre = (float(x), float(y), (bottom + top) / 2)
     size = (float(along), float(across), (top - bottom) / 2)
     _add_box(spec, centre, math.atan2(sin, cos), size, material)

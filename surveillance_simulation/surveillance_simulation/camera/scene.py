@@ -9,9 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from floor_plans import boxes
-from floor_plans.floor_plan import WALL_HEIGHT, WALL_THICKNESS, Door
-from floor_plans.plan_grid import solid_lines
+from floor_plans import Door, shapes
+from floor_plans.shapes import WALL_HEIGHT, WALL_THICKNESS
 from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.textures import TILE, Texture
@@ -56,7 +55,7 @@ def faces_of(world: World) -> list[Face]:
     """
     plan = world.plan
     faces = list(_floor(plan.bounds))
-    for start, end in solid_lines(plan):
+    for start, end in plan.solid_lines():
         faces += _box(start, end, WALL_THICKNESS, 0.0, WALL_HEIGHT, None)
     for door in plan.doors.values():
         faces += _door(door, world.leaf(door.name), ajar=world.door_angle(door.name) > 0.0)
@@ -126,7 +125,7 @@ def _box(
     top: float,
     texture: Texture | None,
 ) -> Iterator[Face]:
-    outline = boxes.corners(boxes.boxes_around([(start, end)], thickness))[0]
+    outline = shapes.corners(shapes.boxes_around([(start, end)], thickness))[0]
     for first, second in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         # Anticlockwise from above: seen from outside, the first corner is on the left.
         yield from _upright(

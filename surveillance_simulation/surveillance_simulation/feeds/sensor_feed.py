@@ -15,8 +15,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String, UInt32
 
-from floor_plans import plan_grid
-from floor_plans.rooms import Pose
+from floor_plans.shapes import Pose
 from strict_files.settings import parameter
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import map_message, nanoseconds_of
@@ -137,7 +136,7 @@ class PlaceFeed:
         self._doors = OwnedTopic(node, DoorStates, 'door_states')
         if setup.published.publish_map:
             self._map = OwnedTopic(node, OccupancyGrid, 'map', repeat=MAP_REPEAT)
-            grid = plan_grid.draw(world.plan, setup.published.map_resolution)
+            grid = world.plan.grid(setup.published.map_resolution)
             self._map.publish(map_message(grid, setup.frames.map, Time()))
         self.tell_doors()
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans.rooms import Pose
+from floor_plans.shapes import Pose
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.physics.model import (
     SOLID,

@@ -13,10 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from floor_plans import boxes
-from floor_plans.floor_plan import WALL_HEIGHT, WALL_THICKNESS
-from floor_plans.plan_grid import solid_lines
-from floor_plans.rooms import Pose
+from floor_plans import shapes
+from floor_plans.shapes import WALL_HEIGHT, WALL_THICKNESS, Pose
 from lidar_navigation.robot_base import robot_footprint
 from strict_files.settings import parameter
 from surveillance_simulation.mujoco_bodies import about_z, add_thing
@@ -113,7 +111,7 @@ def compiled(world: World, radius: float, robot: PhysicsModel, people: int) -> A
         conaffinity=_ON_FLOOR,
     )
     _add_robot(spec, radius, robot)
-    for line in solid_lines(world.plan):
+    for line in world.plan.solid_lines():
         _add_wall(spec, line)
     for name in world.plan.doors:
         if (leaf := world.leaf(name)) is not None:
@@ -214,7 +212,7 @@ def _add_wall(
     line: tuple[tuple[float, float], tuple[float, float]],
     thickness: float = WALL_THICKNESS,
 ) -> None:
-    x, y, cos, sin, along, across = boxes.boxes_around([line], thickness)[0]
+    x, y, cos, sin, along, across = shapes.boxes_around([line], thickness)[0]
     yaw = math.atan2(sin, cos)
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from floor_plans.rooms import Pose
+from floor_plans.shapes import Pose
 from surveillance_simulation.physics.base import Floats, PhysicsBase
 from surveillance_simulation.robot.lidar import LidarModel, Sweep
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floor_plans.rooms import Pose
+from floor_plans.shapes import Pose
 from lidar_navigation.robot_base import robot_deceleration, robot_radius
 from strict_files.settings import parameter
 from surveillance_simulation.world.world import World

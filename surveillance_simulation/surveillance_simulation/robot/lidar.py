@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans import boxes
-from floor_plans.rooms import Pose
+from floor_plans import shapes
+from floor_plans.shapes import Pose
 from strict_files.settings import parameter
 from surveillance_simulation.world.world import World
 
@@ -38,9 +38,9 @@ class LidarModel:
     noise: float = parameter(0.01, 'Standard deviation of a distance, metres.', 0.0, 1.0)
 
     @cached_property
-    def angles(self) -> boxes.Array:
+    def angles(self) -> shapes.Array:
         """Direction of each ray in the robot's frame (rays,), rad."""
-        steps: boxes.Array = np.arange(self.rays, dtype=np.float64) * (2.0 * math.pi / self.rays)
+        steps: shapes.Array = np.arange(self.rays, dtype=np.float64) * (2.0 * math.pi / self.rays)
         return steps - math.pi
 
 
@@ -78,7 +78,7 @@ def scan(
     x, y, yaw = pose
     angles = model.angles + yaw
     direction = np.stack([np.cos(angles), np.sin(angles)])
-    near = boxes.distances(world.solid, x, y) <= model.range_max
+    near = shapes.distances(world.solid, x, y) <= model.range_max
     distance = _to_boxes(world.solid[near], x, y, direction)
     if world.surface is not None:
         distance = np.minimum(distance, world.surface.ranges(x, y, direction, model.range_max))
@@ -91,7 +91,7 @@ def scan(
     return np.maximum(distance, model.range_min).astype(np.float32)
 
 
-def _to_boxes(solid: boxes.Array, x: float, y: float, direction: boxes.Array) -> boxes.Array:
+def _to_boxes(solid: shapes.Array, x: float, y: float, direction: shapes.Array) -> shapes.Array:
     # Seen in the frame of each box: where the rays begin (n, 2), and where they go (n, 2, rays).
     cos, sin = solid[:, 2], solid[:, 3]
     axes = np.array([[cos, sin], [-sin, cos]]).transpose(2, 0, 1)
@@ -110,7 +110,7 @@ def _to_boxes(solid: boxes.Array, x: float, y: float, direction: boxes.Array) ->
     return np.asarray(distance.min(axis=0, initial=np.inf))
 
 
-def _to_discs(discs: boxes.Array, x: float, y: float, direction: boxes.Array) -> boxes.Array:
+def _to_discs(discs: shapes.Array, x: float, y: float, direction: shapes.Array) -> shapes.Array:
     dx, dy = discs[:, 0, None] - x, discs[:, 1, None] - y
     along = dx * direction[0] + dy * direction[1]
     inside = discs[:, 2, None] ** 2 - (dx**2 + dy**2 - along**2)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans.rooms import Pose
+from floor_plans.shapes import Pose
 from surveillance_runtime.robot_arm import ARM, Arm, Array
 from surveillance_simulation.physics.base import PhysicsBase
 from surveillance_simulation.physics.model import PhysicsModel

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from floor_plans import boxes
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans import Grid, shapes
+from floor_plans.occupancy_grid import distance_to
 
 _HALF_DIAGONAL = math.sqrt(0.5)
 
@@ -51,7 +51,7 @@ class MapSurface:
         dy = np.abs(grid.origin[1] + (rows + top + 0.5) * side - y) - side / 2
         return float(np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0)).min())
 
-    def ranges(self, x: float, y: float, direction: boxes.Array, furthest: float) -> boxes.Array:
+    def ranges(self, x: float, y: float, direction: shapes.Array, furthest: float) -> shapes.Array:
         """Return how far rays go before they meet an occupied cell, infinite beyond `furthest`.
 
         Args:
@@ -93,11 +93,11 @@ class MapSurface:
 
 
 def _entered(
-    start: tuple[float, float], direction: boxes.Array, corner: boxes.Array, side: float
-) -> boxes.Array:
+    start: tuple[float, float], direction: shapes.Array, corner: shapes.Array, side: float
+) -> shapes.Array:
     """Return where rays enter the squares that they meet: south-west corners (2, n), metres."""
     slope = np.where(np.abs(direction) < 1e-12, 1e-12, direction)
     begin = np.array(start)[:, None]
     first, second = (corner - begin) / slope, (corner + side - begin) / slope
-    enter: boxes.Array = np.minimum(first, second).max(axis=0)
+    enter: shapes.Array = np.minimum(first, second).max(axis=0)
     return np.maximum(enter, 0.0)

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans import boxes, occupancy_grid, plan_grid
-from floor_plans.floor_plan import WALL_THICKNESS, FloorPlan, Point
+from floor_plans import FloorPlan, occupancy_grid, shapes
+from floor_plans.shapes import WALL_THICKNESS, Point
 from strict_files.settings import parameter
 
 MANNERS = ('polite', 'pushy')
@@ -65,14 +65,14 @@ class People:
         self._people = [self._new(plan.start[:2]) for _ in range(model.count)]
 
     @property
-    def discs(self) -> boxes.Array:
+    def discs(self) -> shapes.Array:
         """Where they are, shape (n, 3): centre x, y and radius, metres."""
         return np.array(
             [(*person.at, self._model.radius) for person in self._people], dtype=float
         ).reshape(-1, 3)
 
     @property
-    def poses(self) -> boxes.Array:
+    def poses(self) -> shapes.Array:
         """Where they are, shape (n, 4): centre x, y and radius in metres, direction in rad."""
         return np.array(
             [(*person.at, self._model.radius, person.ahead) for person in self._people],
@@ -171,7 +171,7 @@ class _Ways:
 
     def __init__(self, plan: FloorPlan, reach: float) -> None:
         self._points = {name: (x, y) for name, (x, y, _) in plan.place.positions.items()}
-        grid = self._grid = plan_grid.draw(plan, _CELL)
+        grid = self._grid = plan.grid(_CELL)
         self._cell = grid.resolution  # that of a map is the map's own
         rows, columns = np.indices(grid.cells.shape)
         x = (columns + 0.5) * self._cell + grid.origin[0]
@@ -180,8 +180,8 @@ class _Ways:
         if plan.map is not None:
             away = occupancy_grid.distance_to(grid.occupied, self._cell)
             clearance = away.astype(np.float64) - self._cell / 2
-        for box in boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS):
-            np.minimum(clearance, boxes.distances(box[None], x, y)[..., 0], out=clearance)
+        for box in shapes.boxes_around(plan.wall_pieces(), WALL_THICKNESS):
+            np.minimum(clearance, shapes.distances(box[None], x, y)[..., 0], out=clearance)
         self._free = (clearance >= reach) & (grid.cells == occupancy_grid.FREE)
         # Walking near a wall is up to three times as dear, so that the middle is preferred.
         crowded = np.clip(1.0 - (clearance - reach) / 0.5, 0.0, 1.0)

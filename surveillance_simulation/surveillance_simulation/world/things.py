@@ -14,7 +14,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from floor_plans import PlaceError, boxes
+from floor_plans import PlaceError, shapes
 
 LIDAR_HEIGHT = 0.18
 """Height of the lidar's plane, metres."""
@@ -141,7 +141,7 @@ def robot(name: str, x: float, y: float, radius: float) -> Thing:
     return checked(Thing(name, 'robot', x, y, 0.0, parts))
 
 
-def discs_of(things: Iterable[Thing]) -> boxes.Array:
+def discs_of(things: Iterable[Thing]) -> shapes.Array:
     """Return what is round in the lidar's plane, (n, 3): centre x, y and (mean) radius, metres."""
     rows = [
         (*thing.at(part), (part.length + part.width) / 4)
@@ -152,7 +152,7 @@ def discs_of(things: Iterable[Thing]) -> boxes.Array:
     return np.array(rows, dtype=float).reshape(-1, 3)
 
 
-def boxes_of(things: Iterable[Thing]) -> boxes.Array:
+def boxes_of(things: Iterable[Thing]) -> shapes.Array:
     """Return the boxes that the lidar's plane cuts, (n, 6), see `boxes`."""
     rows = [
         (

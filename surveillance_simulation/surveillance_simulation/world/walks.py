@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from floor_plans import PlaceError
-from floor_plans.floor_plan import Point
+from floor_plans.shapes import Point
 from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.world import World
 

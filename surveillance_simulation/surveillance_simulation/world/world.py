@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from floor_plans import PlaceError, boxes, read_place_file
-from floor_plans.floor_plan import WALL_THICKNESS, FloorPlan, Marker, Point
-from floor_plans.regions import Regions
+from floor_plans import FloorPlan, Marker, PlaceError, RoomMap, read_place, shapes
+from floor_plans.shapes import WALL_THICKNESS, Point
 from strict_files.suggestions import nearest
 from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.map_surface import MapSurface
@@ -72,13 +71,13 @@ class World:
         self._angles: dict[str, float] = {}
         self._things: dict[str, Thing] = {}
         self._lamps: dict[str, float] = {}
-        self._people: boxes.Array = np.zeros((0, 4))
+        self._people: shapes.Array = np.zeros((0, 4))
         self._robots: dict[str, tuple[float, float, float]] = {}
         self._moves: dict[str, int] = {}
         self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
-        self._walls = boxes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
+        self._walls = shapes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
         self._surface = None if plan.map is None else MapSurface(plan.map.grid)
-        self.regions = Regions(plan)
+        self.regions = RoomMap(plan)
         self._refresh()
 
     @classmethod
@@ -94,7 +93,7 @@ class World:
         return cls(FloorPlan.from_parameters(parameters))
 
     @property
-    def solid(self) -> boxes.Array:
+    def solid(self) -> shapes.Array:
         """Walls, leaves of doors and what is square at the lidar's height, as boxes (n, 6)."""
         return self._solid
 
@@ -104,7 +103,7 @@ class World:
         return self._surface
 
     @property
-    def discs(self) -> boxes.Array:
+    def discs(self) -> shapes.Array:
         """What is round at the lidar's height (n, 3): centre x, y and radius, metres."""
         return self._discs
 
@@ -129,7 +128,7 @@ class World:
         return (*self.people, *(robot_thing(name, *body) for name, body in others))
 
     @property
-    def bodies(self) -> boxes.Array:
+    def bodies(self) -> shapes.Array:
         """The people as upright cylinders (n, 3): centre x, y and radius, metres."""
         standing = [(e.x, e.y, _BODY) for e in self._things.values() if e.kind == 'person']
         return np.concatenate([np.reshape(standing, (-1, 3)), self._people[:, :3]])
@@ -232,7 +231,7 @@ class World:
         del self._things[name]
         self._refresh()
 
-    def move_people(self, people: boxes.Array) -> None:
+    def move_people(self, people: shapes.Array) -> None:
         """Take where the people who walk about are now.
 
         Args:
@@ -250,7 +249,7 @@ class World:
             self._robots[robot] = body
             self._moves[robot] = self._moves.get(robot, 0) + 1
 
-    def discs_around(self, robot: str) -> boxes.Array:
+    def discs_around(self, robot: str) -> shapes.Array:
         """Return what a robot meets of things, people and other robots, shape as `discs`."""
         others = [body for name, body in self._robots.items() if name != robot]
         return np.concatenate([self._discs, others]) if others else self._discs
@@ -315,7 +314,7 @@ class World:
             y: Metres.
             robot: Whose own body is not met.
         """
-        nearest = float(boxes.distances(self._solid, x, y).min(initial=math.inf))
+        nearest = float(shapes.distances(self._solid, x, y).min(initial=math.inf))
         if self._surface is not None:
             nearest = min(nearest, self._surface.clearance(x, y))
         discs = self.discs_around(robot)
@@ -326,7 +325,7 @@ class World:
 
     def wall_clearance(self, x: float, y: float) -> float:
         """Return the distance from a point to the nearest wall or leaf, whatever stands about."""
-        closed = boxes.distances(self._enclosing, x, y).min(initial=math.inf)
+        closed = shapes.distances(self._enclosing, x, y).min(initial=math.inf)
         surface = math.inf if self._surface is None else self._surface.clearance(x, y)
         return float(min(closed, surface))
 
@@ -348,8 +347,8 @@ class World:
         self._enclosing = np.concatenate(
             [
                 self._walls,
-                boxes.boxes_around(closed, WALL_THICKNESS),
-                boxes.boxes_around(turned, LEAF_THICKNESS),
+                shapes.boxes_around(closed, WALL_THICKNESS),
+                shapes.boxes_around(turned, LEAF_THICKNESS),
             ]
         )
         self._solid = np.concatenate([self._enclosing, boxes_of(self._things.values())])
@@ -372,4 +371,4 @@ def read_world(path: str | Path) -> World:
     Raises:
         FileError: The file cannot be read, or describes no sound place; one line.
     """
-    return World(read_place_file(path).plan)
+    return World(read_place(path).plan)

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from floor_plans import Place, PlaceError, Regions, check_passable
 from floor_plans.description import described_in, map_file_beside
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.patrol_rules import PatrolRules, patrol_rules
-from floor_plans.regions import ROBOT_RADIUS
+from floor_plans.room_map import ROBOT_RADIUS, RoomMap, check_passable
+from floor_plans.rooms import Place, PlaceError
 from floor_plans.writing import updated_text
 from strict_files.files import FileError, in_one_line, replace_text
 from strict_files.suggestions import nearest
@@ -38,7 +38,7 @@ class Moment:
     described: Mapping[str, Any]
     renamed: Mapping[tuple[str, str], str]
     plan: FloorPlan
-    regions: Regions
+    regions: RoomMap
     rules: PatrolRules
     said: str = ''
 
@@ -230,7 +230,7 @@ class PlaceEditor:
     ) -> Moment:
         whole = self._whole(described)
         plan = FloorPlan.from_parameters(whole, self._map)
-        regions = Regions(plan)
+        regions = RoomMap(plan)
         check_passable(plan, self._radius)
         rules = patrol_rules(whole, plan.place.rooms)
         self._more_checks(plan.place)

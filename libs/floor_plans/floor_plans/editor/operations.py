@@ -12,12 +12,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from floor_plans import problem_in_name
-from floor_plans.editor.shapes import cut_of, door_on_wall, fitted_door, free_point, sides_of
+from floor_plans.editor.measures import (
+    cut_of,
+    door_on_wall,
+    fitted_door,
+    free_point,
+    sides_of,
+)
 from floor_plans.floor_plan import Door, FloorPlan
-from floor_plans.plan_grid import draw
-from floor_plans.regions import Regions
-from floor_plans.rooms import PATROL_TABLES
+from floor_plans.room_map import RoomMap
+from floor_plans.rooms import PATROL_TABLES, problem_in_name
 from strict_files.suggestions import nearest
 
 _ROOM_TABLES = ('map', 'room_positions', 'stations', *PATROL_TABLES)
@@ -41,7 +45,7 @@ class Draft:
     described: dict[str, Any]
     renamed: dict[tuple[str, str], str]
     plan: FloorPlan
-    regions: Regions
+    regions: RoomMap
     radius: float
 
     def table(self, name: str) -> dict[str, Any]:
@@ -177,7 +181,7 @@ def move_door(draft: Draft, name: str, x: float, y: float) -> str:
 
 def _door_at(draft: Draft, x: float, y: float, width: float) -> Door:
     if draft.plan.map is not None:
-        return fitted_door(draw(draft.plan), x, y)
+        return fitted_door(draft.plan.grid(), x, y)
     if draft.plan.walls:
         return door_on_wall(draft.plan, x, y, width)
     return Door('', x, y, 0.0, width)

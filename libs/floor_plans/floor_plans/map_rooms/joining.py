@@ -55,7 +55,7 @@ def joined(
     cell = resolution**2
     area = np.bincount(parts.ravel(), minlength=count) * cell
     depth = np.bincount(parts.ravel(), weights=clearance.ravel(), minlength=count) * cell
-    room = _Rooms(area.tolist(), depth.tolist(), _borders(parts, cuts, clearance, resolution))
+    room = _Joining(area.tolist(), depth.tolist(), _borders(parts, cuts, clearance, resolution))
     return room.join()
 
 
@@ -86,7 +86,7 @@ def _borders(
     return found
 
 
-class _Rooms:
+class _Joining:
     def __init__(
         self,
         area: list[float],

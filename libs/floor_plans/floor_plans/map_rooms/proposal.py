@@ -18,11 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.floor_plan import Door, FloorPlan
-from floor_plans.map_rooms.segmentation import Line, Segmentation, segment, spread
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans.map_rooms.segmentation import (
+    Line,
+    Segmentation,
+    segment,
+    spread,
+)
+from floor_plans.occupancy_grid import Grid, distance_to, walled_off
 from floor_plans.occupancy_map import OccupancyMap
-from floor_plans.plan_grid import walled_off
-from floor_plans.regions import Regions, check_passable
+from floor_plans.room_map import RoomMap, check_passable
 from floor_plans.rooms import PlaceError
 
 Labels = NDArray[np.int32]
@@ -221,7 +225,7 @@ def _not_parted(floor: _Floor, layout: _Layout) -> tuple[int, int] | None:
     parameters, names = layout.proposal.parameters, layout.proposal.names
     try:
         plan = FloorPlan.from_parameters(parameters, floor.building)
-        Regions(plan)
+        RoomMap(plan)
         check_passable(plan, floor.radius)
     except PlaceError as error:
         table, name, *_ = (*error.where, '', '')

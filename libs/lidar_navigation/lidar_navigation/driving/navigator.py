@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from floor_plans.floor_plan import Segment
-from floor_plans.occupancy_grid import Grid, with_walls
-from floor_plans.zones import NO_ZONES, Zones
+from floor_plans import Grid, Zones
+from floor_plans.occupancy_grid import with_walls
+from floor_plans.parameters import NO_ZONES
+from floor_plans.shapes import Segment
 from lidar_navigation.driving.driving import Drive, Spin
 from lidar_navigation.driving.obstacle_memory import ObstacleMemory
 from lidar_navigation.driving.path_following import Velocity

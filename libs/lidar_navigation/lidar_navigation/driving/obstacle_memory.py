@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 from lidar_navigation.geometry import Points, Pose, Scan, composed, in_map
 
 _Cell = tuple[int, int]

@@ -12,7 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.occupancy_grid import FREE, OCCUPIED, UNKNOWN, Grid
+from floor_plans import Grid
+from floor_plans.occupancy_grid import FREE, OCCUPIED, UNKNOWN
 from lidar_navigation.geometry import Points, Pose, Scan, composed
 
 HIT, PASSED = 17, -8

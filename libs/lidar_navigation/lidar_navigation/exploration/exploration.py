@@ -17,7 +17,8 @@ from typing import Protocol
 
 import numpy as np
 
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 from lidar_navigation.driving.driving import Drive, Spin, State
 from lidar_navigation.driving.path_following import DriveParameters, Velocity
 from lidar_navigation.exploration.frontiers import Frontier, FrontierParameters, find_frontiers

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, composed
 
 

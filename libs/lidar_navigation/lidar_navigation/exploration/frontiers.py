@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skimage.graph import MCP_Geometric
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.geometry import Points, Pose, angle_between
 from strict_files.settings import parameter
 

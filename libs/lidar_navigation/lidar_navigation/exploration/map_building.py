@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans import Grid
 from lidar_navigation.exploration.evidence_grid import EvidenceGrid
 from lidar_navigation.exploration.pose_graph import Edge, PoseGraph
 from lidar_navigation.exploration.scan_matching import (

@@ -13,8 +13,9 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from floor_plans.floor_plan import Segment
-from floor_plans.occupancy_grid import Grid, drawn_lines, regions
+from floor_plans import Grid
+from floor_plans.occupancy_grid import drawn_lines, regions
+from floor_plans.shapes import Segment
 from lidar_navigation.geometry import Points
 
 BESIDE = 0.3

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.graph import MCP_Geometric
 
-from floor_plans.floor_plan import Segment
-from floor_plans.occupancy_grid import Grid, distance_to, points_on, with_walls
-from floor_plans.plan_grid import zone_cells
-from floor_plans.zones import NO_ZONES, Zones
+from floor_plans import Grid, Zones
+from floor_plans.occupancy_grid import distance_to, points_on, with_walls
+from floor_plans.parameters import NO_ZONES
+from floor_plans.shapes import Segment
 from lidar_navigation import geometry
 from lidar_navigation.footprint import Footprint
 from lidar_navigation.geometry import Points
@@ -120,7 +120,7 @@ class GridPlanner:
         if self.zones.keep_out:
             barred = ~self.grid.free
             for zone in self.zones.keep_out.values():
-                barred |= zone_cells(self.grid, zone)
+                barred |= zone.cells_on(self.grid)
             self._static = self._distance(barred)
         self._slower = self._times_longer()
         self._reach = math.ceil((p.kept + p.margin + p.comfort) / self.grid.resolution) + 1
@@ -256,7 +256,7 @@ class GridPlanner:
         for zone in self.zones.slow.values():
             assert zone.speed is not None
             times = min(max(self.parameters.cruise / zone.speed, 1.0), _DEAREST)
-            cells = zone_cells(self.grid, zone)
+            cells = zone.cells_on(self.grid)
             longer[cells] = np.maximum(longer[cells], np.float32(times))
         return longer
 

@@ -1,6 +1,6 @@
 """Which room a point of a floor plan lies in, and whether walls, doors and rooms fit together.
 
-A floor plan says where walls stand and the map which rooms its doors join. `Regions` finds the
+A floor plan says where walls stand and the map which rooms its doors join. `RoomMap` finds the
 rooms between the walls and compares; `check_passable` asks whether a robot gets everywhere.
 """
 
@@ -11,10 +11,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from floor_plans.floor_plan import WALL_THICKNESS, FloorPlan
+from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_grid import UNKNOWN, distance_to, regions
-from floor_plans.plan_grid import draw, walled, zone_cells
 from floor_plans.rooms import PlaceError
+from floor_plans.shapes import WALL_THICKNESS
 
 ROBOT_RADIUS = 0.22
 """Radius of a robot that has to get through the doors, metres, where nobody says another one."""
@@ -22,7 +22,7 @@ _LARGE = 1.0
 """A part of the floor from this size on that no point lies in is no part of a room, m^2."""
 
 
-class Regions:
+class RoomMap:
     """The rooms of a floor plan as regions of a grid.
 
     Args:
@@ -36,7 +36,7 @@ class Regions:
     def __init__(self, plan: FloorPlan) -> None:
         self._plan = plan
         lines = plan.wall_pieces() + [door.ends for door in plan.doors.values()]
-        self.grid = walled(plan, lines)
+        self.grid = plan.walled(lines)
         if plan.walls and plan.map is None:
             self._labels = regions(self.grid.free)
             self._names = self._named()
@@ -192,10 +192,10 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
             )
     if not plan.is_enclosed:
         return
-    grid = draw(plan)
+    grid = plan.grid()
     solid = ~grid.free if plan.map is not None else grid.occupied
     for zone in plan.zones.keep_out.values():
-        solid |= zone_cells(grid, zone)
+        solid |= zone.cells_on(grid)
     clearance = distance_to(solid, grid.resolution)
     # A cell's centre may be half a cell farther from the wall than the wall's own surface.
     fits = (clearance > radius - grid.resolution / 2).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Upright boxes seen from above: the one shape that walls, doors and panels are made of.
+"""Points, lines, poses, and upright boxes: what walls, doors and panels are made of.
 
 A set of boxes is an array (n, 6) with one row per box: centre x and y in metres, cosine and sine of
 the direction of its long side, half its length and half its thickness in metres.
@@ -14,6 +14,17 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Point = tuple[float, float]
+"""x and y, metres."""
+Position = tuple[float, float, float]
+"""x, y and z, metres."""
+Pose = tuple[float, float, float]
+"""x, y in metres, yaw in rad, world frame."""
+Segment = tuple[float, float, float, float]
+"""A line from x1, y1 to x2, y2, metres."""
+
+WALL_THICKNESS = 0.1
+WALL_HEIGHT = 2.5
+"""Of the walls that a place's file draws, metres."""
 
 
 def boxes_around(lines: Iterable[tuple[Point, Point]], thickness: float) -> Array:

@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from floor_plans.floor_plan import WALL_THICKNESS, Door, FloorPlan, Point
+from floor_plans.floor_plan import Door, FloorPlan
 from floor_plans.map_rooms.proposal import point_in
 from floor_plans.occupancy_grid import Grid, distance_to, drawn_lines
-from floor_plans.regions import Regions
+from floor_plans.room_map import RoomMap
+from floor_plans.shapes import WALL_THICKNESS, Point
 
 Mask = NDArray[np.bool_]
 _BESIDE = (0.12, 0.3, 0.5)
@@ -23,7 +24,7 @@ _SMALLEST_PART = 0.25
 
 
 @dataclass(frozen=True)
-class Cut:
+class CutRoom:
     """A line from wall to wall through a room.
 
     Attributes:
@@ -39,7 +40,7 @@ class Cut:
     other: Mask
 
 
-def cut_of(plan: FloorPlan, regions: Regions, start: Point, end: Point, radius: float) -> Cut:
+def cut_of(plan: FloorPlan, regions: RoomMap, start: Point, end: Point, radius: float) -> CutRoom:
     """Return how a drawn line cuts the room that it runs through.
 
     The line is carried on to the walls, so it need not reach them.
@@ -77,7 +78,7 @@ def cut_of(plan: FloorPlan, regions: Regions, start: Point, end: Point, radius: 
     yaw = math.remainder(math.atan2(along[1], along[0]), math.pi)
     door = Door('', float(centre[0]), float(centre[1]), yaw, width)
     own, other = _parts(plan, regions, room, free, door)
-    return Cut(room, door, own, other)
+    return CutRoom(room, door, own, other)
 
 
 def _stretch(
@@ -118,7 +119,7 @@ def _centre(
 
 
 def _parts(
-    plan: FloorPlan, regions: Regions, room: str, free: Mask, door: Door
+    plan: FloorPlan, regions: RoomMap, room: str, free: Mask, door: Door
 ) -> tuple[Mask, Mask]:
     """Return the two parts of a room on the sides of a line, the one with its point first."""
     grid = regions.grid
