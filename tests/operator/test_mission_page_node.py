@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from floor_plans import read_place_file
+from floor_plans import read_place
 from floor_plans.editor import PlaceEditor
 from surveillance_operator.mission_page_node import RoomChanges
 from surveillance_operator.place_page.edit_session import EditSession
@@ -59,7 +59,7 @@ def changes(session: EditSession | None) -> tuple[RoomChanges, Mission]:
 
 
 def rooms_of(file: Path) -> set[str]:
-    return set(read_place_file(file).plan.place.rooms)
+    return set(read_place(file).plan.place.rooms)
 
 
 def shown(session: EditSession) -> set[str]:

@@ -42,7 +42,7 @@ def test_a_room_is_removed_with_its_doors_and_brought_back(typed: PlaceEditor) -
     typed.apply('set_keep_out', {'room': 'R3', 'on': True})
     assert typed.apply('remove_room', {'room': 'R3'}) == 'R3 is removed'
     typed.save()
-    written = read_place_file(typed.path)
+    written = read_place(typed.path)
     assert 'R3' not in written.place.rooms
     assert 'D3' not in {*written.place.doors, *written.plan.doors}
     assert 'R3' not in (typed.now.described.get('keep_out') or ())
