@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date, datetime, timedelta
 from html import escape
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from indoor_watch.day_book import DayBook, Seen
 from indoor_watch.events import Event, EventState
@@ -20,6 +21,7 @@ from indoor_watch.privacy import PictureError, shareable
 from strict_files.files import FileError, read_file, replace_text
 from surveillance_operator.map_command import counted
 from surveillance_operator.run_entries import PastIncident, entries_of_run, incidents_of
+from surveillance_perception.finding_teller import findings_of
 
 OBSERVER, EVIDENCE = 'observer.json', 'evidence'
 MOST_BYTES = 200_000_000
@@ -56,7 +58,7 @@ def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
         kept = json.loads(read_file(path, MOST_BYTES))
         book = DayBook(datetime.fromtimestamp)
         book.restore(kept.get('days', {}))
-        events = [Event.from_json(each) for each in kept['book']['events']]
+        events = _findings(folder, kept['book']['events'])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise FileError(f'{path}: cannot be read: {error!s:.100}') from None
     wanted = _day(day, book)
@@ -86,6 +88,24 @@ def _day(text: str, book: DayBook) -> str:
         raise FileError(
             f'--day {text!r}: expected such as 2026-03-01, or today, yesterday, last'
         ) from None
+
+
+def _findings(folder: Path, kept: Sequence[Mapping[str, Any]]) -> list[Event]:
+    """Return what was found: from the log, and what the observer's state knows better.
+
+    Args:
+        folder: Of the run.
+        kept: Of the state: what goes on, whose last sightings it has; of a run of an earlier
+            version everything.
+    """
+    try:
+        found = findings_of(entries_of_run(folder, whole=True).entries)
+    except FileError:
+        found = {}
+    for each in map(Event.from_json, kept):
+        if each.number not in found or each.sightings >= found[each.number].sightings:
+            found[each.number] = each
+    return list(found.values())
 
 
 def _called(folder: Path, begin: float, end: float) -> list[PastIncident]:

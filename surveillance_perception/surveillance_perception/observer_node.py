@@ -70,6 +70,7 @@ from surveillance_perception.conversions import (
     matrix_of,
     seen_marker_from_ros,
 )
+from surveillance_perception.finding_teller import FindingTeller
 from surveillance_perception.marker_registry import read_registry
 from surveillance_perception.stream.image_subscription import ImageSubscription
 from surveillance_runtime.conversions import (
@@ -80,7 +81,7 @@ from surveillance_runtime.conversions import (
     stamp_of_serialized,
 )
 from surveillance_runtime.fleet_messages import hear_fleet
-from surveillance_runtime.incidents import Severity
+from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place_parameters import door_segments, place_positions
@@ -147,6 +148,9 @@ class ObserverSettings:
     )
     state_file: str = parameter(
         '', 'File that keeps events and what is normal over a restart; empty: nothing is kept.'
+    )
+    record: str = parameter(
+        '', 'The log of the run, which gets what was found and what people said; empty: none.'
     )
     evidence_folder: str = parameter(
         '', 'Folder for pictures of what was seen; empty: no picture is kept.'
@@ -272,8 +276,17 @@ class Observer(PatrolNode):
         self._robot = self.get_namespace().strip('/') or ROBOT
         self._robot_name = self._robot.rpartition('/')[2]
         self.sweeps = 0
-        self._told: dict[int, EventState] = {}
-        self._book = EventBook(told=self._on_event)
+        try:
+            self._teller = FindingTeller(
+                self.incidents,
+                self._settings.record,
+                self.get_logger().info,
+                self.get_logger().warn,
+                self._now,
+            )
+        except FileError as error:
+            raise NotNowError(f'parameter record: {error}') from None
+        self._book = EventBook(told=self._teller.changed)
         self._pictures = self._store()
         self._days = DayBook(datetime.fromtimestamp)
         self.others = OtherRobots(self._settings.radius)
@@ -283,7 +296,7 @@ class Observer(PatrolNode):
             self._book,
             local=datetime.fromtimestamp,
             tell=self._on_observation,
-            alert=self._on_alert,
+            alert=self._teller.alert,
             robot=self._robot,
             doors=self._doors,
             markers=self._known_markers(),
@@ -722,6 +735,7 @@ class Observer(PatrolNode):
     async def _on_command(self, request: Any, response: Any) -> Any:
         def take() -> str:
             answer = answered(self._book, request.line, self._watcher.answer)
+            self._teller.answered(request.line, answer)
             self._publish_events()
             return answer
 
@@ -866,17 +880,20 @@ class Observer(PatrolNode):
         self._publish_events()
 
     def _keep(self) -> None:
+        self._teller.keep(self._book.current)
         if self._pictures is not None:
             self._pictures.forget_old(self._now())
         if self._kept:
             state = {**self._watcher.state(), 'days': self._days.to_json()}
+            state['book'] = self._teller.kept(state['book'])
             self._complain(self._kept.write(state))
 
     def _restore(self, kept: Mapping[str, Any]) -> None:
         days = DayBook(datetime.fromtimestamp)
         days.restore(kept['days'])
-        self._watcher.restore(kept)
+        self._watcher.restore({**kept, 'book': self._teller.restored(kept['book'])})
         self._days = days
+        self._teller.take_up(kept['book'], self._book.find)
 
     def _on_observation(self, seen: Observation) -> None:
         self._days.take(seen)
@@ -887,22 +904,6 @@ class Observer(PatrolNode):
         self._last_looks[look.place] = look
         told = {place: each.to_json() for place, each in sorted(self._last_looks.items())}
         self._looks.publish(String(data=json.dumps(told)))
-
-    def _on_event(self, event: Event) -> None:
-        """Log each beginning and end."""
-        if self._told.get(event.number) != event.state:
-            self._told[event.number] = event.state
-            self.get_logger().info(f'event {event.words()}')
-        if event.state != EventState.OPEN:
-            self.incidents.end(_cause(event), f'{event.words()}')
-
-    def _on_alert(self, event: Event) -> None:
-        if self._pictures is not None:
-            self._pictures.describe(event.number, json.dumps(event.to_json()))
-        # Told once: each look sees the middle of a thing elsewhere by some centimetres.
-        if _cause(event) not in self.incidents.open():
-            text = f'{event.words()} ({event.rule})'
-            self.incidents.begin(_cause(event), text, Severity.ALARM)
 
     def _publish_events(self) -> None:
         text = json.dumps([each.to_json() for each in self._book.events[:MOST_TOLD]])
@@ -941,10 +942,6 @@ class Observer(PatrolNode):
                     self.get_logger().warn(
                         f'events are not in the ontology: {error}', throttle_duration_sec=60.0
                     )
-
-
-def _cause(event: Event) -> tuple[str, str]:
-    return 'event', str(event.number)
 
 
 def _fact(event: Event, checked_every: int) -> EventFact:

@@ -233,6 +233,18 @@ class Incidents:
             self._open[about] = told
         self._tell(told)
 
+    def acknowledge(self, cause: tuple[str, str], by: str) -> None:
+        """Note who takes care of an incident; nothing happens when there is none.
+
+        Args:
+            cause: As it began.
+            by: Who, in words.
+        """
+        with self._lock:
+            known = self._open.get(Cause(*cause))
+        if known is not None:
+            self.begin(cause, known.text, known.severity, acknowledged_by=by)
+
     def end(self, cause: tuple[str, str], text: str = '') -> None:
         """End an incident; nothing happens when there is none.
 

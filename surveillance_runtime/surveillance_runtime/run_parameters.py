@@ -127,7 +127,7 @@ def simulator_entries(simulator: str) -> Iterator[Entry]:
 
 def record_entries(record: Path) -> Iterator[Entry]:
     """Yield where the nodes that write the mission's record find it."""
-    for node in (BEHAVIOUR_NODE, 'reasoner', 'initial_state'):
+    for node in (BEHAVIOUR_NODE, 'reasoner', 'initial_state', OBSERVER):
         yield for_node(node, 'record', str(record), 'this run')
 
 

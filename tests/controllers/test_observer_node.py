@@ -32,6 +32,7 @@ from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_perception import observer_node
 from surveillance_perception.observer_node import Observer
 from surveillance_runtime.conversions import map_from
+from surveillance_runtime.event_log import read
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
@@ -72,6 +73,7 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
         'watch_file': str(tmp_path / 'watch.yaml'),
         'evidence_folder': str(tmp_path / 'evidence'),
         'state_file': str(tmp_path / 'observer.json'),
+        'record': str(tmp_path / 'events.jsonl'),
     }
     node = graph.add(
         Observer,
@@ -124,7 +126,11 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
     graph.until(lambda: json.loads(events[-1].data)[0]['state'] == 'normal')
     graph.remove(node)
     kept = json.loads((tmp_path / 'observer.json').read_text())
-    assert kept['book']['events'][0]['state'] == 'normal'
+    assert kept['book']['events'] == [], 'what is over is in the log'
+    told = read(tmp_path / 'events.jsonl')
+    states = [each.text('state') for each in told if each.name == 'finding']
+    assert (states[0], states[-1]) == ('open', 'normal')
+    assert [each.text('line') for each in told if each.name == 'answer'] == ['normal 1']
 
 
 def test_it_hears_of_the_other_robots_of_its_fleet_and_where_they_are(graph):

@@ -83,17 +83,6 @@ def test_what_is_older_than_its_days_is_deleted(tmp_path: Path):
     assert oldest(NOW, 2.0) == 1_699_827_200_250
 
 
-def test_the_last_five_hundred_events_are_described(tmp_path: Path):
-    store = EvidenceStore(tmp_path)
-    for number in (1, 2, 3):
-        store.describe(number, f'{{"number": {number}, "what": "Tür"}}')
-    (tmp_path / 'event_x.json').write_text('{}')
-    assert (tmp_path / 'event_2.json').read_text('utf-8') == '{"number": 2, "what": "Tür"}'
-    store.describe(502, '{}')
-    assert names(tmp_path) == ['event_3.json', 'event_502.json', 'event_x.json']
-    assert store.total == 0, 'they are no pictures'
-
-
 def test_a_full_disk_costs_the_picture_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     store = EvidenceStore(tmp_path)
 
@@ -103,7 +92,6 @@ def test_a_full_disk_costs_the_picture_alone(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(Path, 'write_bytes', full)
     monkeypatch.setattr(Path, 'write_text', full)
     assert store.keep(PLAIN, 'b', 1, NOW) == ''
-    store.describe(1, '{}')
     assert names(tmp_path) == []
     assert store.total == 0
 

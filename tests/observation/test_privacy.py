@@ -72,16 +72,6 @@ def test_pictures_are_deleted_after_their_time(tmp_path: Path) -> None:
     assert old
 
 
-def test_events_are_described_beside_their_pictures_in_bounded_number(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr('indoor_watch.evidence.MOST_DESCRIBED', 2)
-    store = EvidenceStore(tmp_path)
-    for number in range(1, 5):
-        store.describe(number, '{}')
-    assert sorted(each.name for each in tmp_path.iterdir()) == ['event_3.json', 'event_4.json']
-
-
 def test_two_things_that_are_noticed_at_once_have_a_picture_each(tmp_path):
     store = EvidenceStore(tmp_path)
     names = [

@@ -23,9 +23,6 @@ AROUND = 3.0
 SCALE = 60.0
 """Pixels for a metre."""
 _NAME = re.compile(r'(\d)_(\d{13})_.*')
-_DESCRIBED = re.compile(r'event_(\d+)\.json')
-MOST_DESCRIBED = 500
-"""So many events are described in the folder, those of the highest numbers."""
 DAY = 86400.0
 
 
@@ -87,20 +84,6 @@ class EvidenceStore:
     def total(self) -> int:
         """Bytes of all files."""
         return sum(self._sizes.values())
-
-    def describe(self, number: int, event: str) -> None:
-        """Keep an event as JSON beside its pictures, for whoever tells people of it."""
-        path = self._folder / f'event_{number}.json'
-        part = path.with_suffix('.part')
-        try:
-            part.write_text(event, 'utf-8')
-            part.replace(path)
-            for each in self._folder.glob('event_*.json'):
-                match = _DESCRIBED.fullmatch(each.name)
-                if match is not None and int(match[1]) <= number - MOST_DESCRIBED:
-                    each.unlink(missing_ok=True)
-        except OSError:
-            return  # the disk is full: the alarm counts without it
 
     def forget_old(self, stamp: float) -> None:
         """Delete what is older than it may become.

@@ -1,0 +1,103 @@
+"""What the observer found is an incident while it goes on, and in the log for ever."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from indoor_watch.events import Event, EventBook, EventState
+from indoor_watch.observations import Kind, Observation
+from surveillance_perception.finding_teller import PERSON, FindingTeller, findings_of
+from surveillance_runtime.event_log import read
+from surveillance_runtime.incidents import Incidents, IncidentUpdate
+
+pytestmark = pytest.mark.unit
+
+
+class Told:
+    """An observer's book, with what is told of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / 'events.jsonl'
+        self.updates: list[IncidentUpdate] = []
+        self.incidents = Incidents(self.updates.append, 'observer')
+        self.teller = FindingTeller(
+            self.incidents, str(self.path), lambda _: None, lambda _: None, lambda: 7.0
+        )
+        self.book = EventBook(told=self.teller.changed)
+
+    def see_door(self, state: str, stamp: float, look: int = 1) -> Event | None:
+        """See the door D1; ajar matters."""
+        seen = Observation(Kind.DOOR, state, 'C1', 'D1', stamp=stamp, evidence=f'3_{look}_a.jpg')
+        severity = 3 if state == 'ajar' else 0
+        found = self.book.take(seen, severity=severity, rule='D1 is shut', look=look)
+        if found is not None and severity:
+            self.teller.alert(found)
+        return found
+
+    @property
+    def phases(self) -> list[str]:
+        return [each.phase.value for each in self.updates]
+
+
+def test_an_alert_is_an_incident_with_what_was_seen(tmp_path: Path) -> None:
+    told = Told(tmp_path)
+    told.see_door('ajar', 10.0)
+    told.see_door('ajar', 20.0, look=2)
+    (begun,) = told.updates
+    assert begun.text == '1: door D1 is ajar in C1 (D1 is shut)'
+    assert (begun.place, begun.evidence) == ('C1', ('3_1_a.jpg',))
+    assert begun.finding is not None
+    assert (begun.finding.number, begun.finding.kind, begun.finding.subject) == (1, 'door', 'D1')
+    told.see_door('closed', 30.0, look=3)
+    assert told.phases == ['begin', 'end']
+
+
+def test_who_takes_care_is_noted_and_the_end_comes_when_it_is_over(tmp_path: Path) -> None:
+    told = Told(tmp_path)
+    told.see_door('ajar', 10.0)
+    told.book.answer(1, EventState.ACKNOWLEDGED)
+    assert told.phases == ['begin', 'update']
+    assert told.updates[-1].acknowledged_by == PERSON
+    told.see_door('closed', 30.0, look=2)
+    assert told.phases == ['begin', 'update', 'end']
+
+
+@pytest.mark.parametrize('state', [EventState.NORMAL, EventState.FALSE])
+def test_what_a_person_calls_normal_or_false_is_over(tmp_path: Path, state: EventState) -> None:
+    told = Told(tmp_path)
+    told.see_door('ajar', 10.0)
+    told.book.answer(1, state)
+    assert told.phases == ['begin', 'end']
+
+
+def test_the_log_has_each_change_and_further_looks(tmp_path: Path) -> None:
+    told = Told(tmp_path)
+    found = told.see_door('ajar', 10.0)
+    assert found is not None
+    told.teller.keep([found])
+    told.teller.keep([replace(found, looks=2, sightings=5)])
+    told.see_door('closed', 30.0, look=3)
+    entries = read(told.path)
+    assert [(e.name, e.text('state'), e.fields['looks']) for e in entries] == [
+        ('finding', 'open', 1),
+        ('finding', 'open', 2),
+        ('finding', 'over', 1),
+    ]
+    assert findings_of(entries)[1].state == EventState.OVER
+
+
+def test_after_a_restart_the_book_is_whole_and_what_goes_on_is_told(tmp_path: Path) -> None:
+    told = Told(tmp_path)
+    told.see_door('ajar', 10.0)
+    told.see_door('closed', 20.0, look=2)
+    told.see_door('ajar', 30.0, look=3)
+    kept = told.teller.kept(told.book.to_json())
+    assert [each['number'] for each in kept['events']] == [2], 'what is over is in the log'
+    again = Told(tmp_path)
+    again.book.restore(again.teller.restored(kept))
+    again.teller.take_up(kept, again.book.find)
+    assert [each.state for each in again.book.events] == ['open', 'over']
+    assert [str(each) for each in again.incidents.open()] == ['event 2']
