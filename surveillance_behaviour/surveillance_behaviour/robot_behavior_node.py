@@ -39,8 +39,8 @@ from surveillance_behaviour.ros_adapters.peers import (
     hear_battery,
     ros_ontology,
 )
-from surveillance_behaviour.ros_adapters.purpose_feed import PurposeFeed
 from surveillance_behaviour.ros_adapters.reason_client import ReasonClient
+from surveillance_behaviour.ros_adapters.watchdog_inputs import WatchdogInputs
 from surveillance_runtime.conversions import charging_from, seconds_of
 from surveillance_runtime.duplicate_nodes import DuplicateNodeWatch
 from surveillance_runtime.introspection import IntrospectionServer
@@ -106,7 +106,7 @@ class RobotBehavior(PatrolNode):
         self._introspection.start()
         DuplicateNodeWatch(self)
         hear_battery(self, battery)
-        PurposeFeed(self, self.mission, self.machine, self._announcer, deadlines, clock.elapsed)
+        WatchdogInputs(self, self.mission, self.machine, self._announcer, deadlines, clock.elapsed)
         StateSubscription(
             self,
             BatteryState,

@@ -12,7 +12,7 @@ from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.charge_estimate import ChargeEstimate
 from surveillance_behaviour.charging import BatteryMonitor, charge
-from surveillance_behaviour.mission.mission_log import Looked, Summary, side_name, stand_name
+from surveillance_behaviour.mission.mission_log import InspectionLog, Summary, side_name, stand_name
 
 
 def test_a_summary_is_a_table_of_the_places_and_a_line_for_each_count() -> None:
@@ -45,14 +45,14 @@ def test_a_summary_is_a_table_of_the_places_and_a_line_for_each_count() -> None:
 
 
 def test_what_was_looked_at_last_comes_last() -> None:
-    looked = Looked({'A': ['0', '90']})
+    looked = InspectionLog({'A': ['0', '90']})
     assert [looked.rank('A', side) for side in ('0', '90', '180')] == [1, 2, 0]
     looked.note('A', '0', '180')
     assert [looked.rank('A', side) for side in ('90', '0', '180')] == [1, 2, 3]
     assert (looked.latest('A'), looked.latest('B'), looked.rank('B', '0')) == ('180', '', 0)
     looked.note('B', *map(str, range(201)))
     assert looked.to_json() == {'A': ['90', '0', '180'], 'B': [str(n) for n in range(1, 201)]}
-    assert Looked(looked.to_json()).to_json() == looked.to_json()
+    assert InspectionLog(looked.to_json()).to_json() == looked.to_json()
     assert stand_name(None) == 'own point'
     assert stand_name((1.5, -2.0)) == '1.5 -2'
     assert side_name(90, None) == '90'

@@ -27,7 +27,7 @@ DISTRIBUTIONS = {
     'ruamel': 'ruamel.yaml',
     'paho': 'paho-mqtt',
 }
-# Looked for at run time and done without when absent: an installed ROS has them.
+# InspectionLog for at run time and done without when absent: an installed ROS has them.
 OPTIONAL = {
     'tf2_msgs',
     'nav2_msgs',

@@ -30,7 +30,7 @@ from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.pose import pose_of
 from state_machines import Interrupt
 from surveillance_behaviour.mission.looking import RoomLook
-from surveillance_behaviour.mission.mission_log import Looked
+from surveillance_behaviour.mission.mission_log import InspectionLog
 from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.rendering import Renderer
@@ -91,7 +91,7 @@ class Patrol:
             place='C1',
             explored=0.0,
             settings=settings,
-            looked=Looked(),
+            looked=InspectionLog(),
             ports=SimpleNamespace(looking=self),
             note=lambda *_, **__: None,
             say=lambda *_, **__: None,

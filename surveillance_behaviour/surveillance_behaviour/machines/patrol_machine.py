@@ -54,7 +54,7 @@ class Initial(MissionState):
         routine_of(mission).start(interrupt)
         mission.ports.ontology.wait_until_built(interrupt)
         mission.begin(interrupt)
-        goes_on = mission.goes_on and not mission.astray and not math.isinf(mission.explored)
+        goes_on = mission.notes.goes_on and not mission.astray and not math.isinf(mission.explored)
         return 'look_on' if self._looks and goes_on and not mission.battery.low else 'start'
 
 
@@ -208,7 +208,7 @@ class Recharge(MissionState):
                 decision = mission.decide(interrupt, to_charge=True)
             ud.target = decision.place
             return 'not_at_dock' if decision.rule == RECHARGE else 'battery_full'
-        self.charging = mission.docking = True
+        self.charging = mission.dock.to_station = True
         ud.target = mission.place
         mission.say(f'charging in {mission.place} ({mission.battery.level_text()})')
         mission.charge(interrupt, routine_of(mission).recharge)

@@ -279,6 +279,6 @@ class ReDock(MissionState):
         if mission.recovery.next_step(mission.failure, mission.now()) != Step.ANOTHER_PATH:
             return 'give_up'
         ud.next_room = mission.place
-        mission.docking = True
+        mission.dock.to_station = True
         mission.say(f'driving to the station in {mission.place} again')
         return 'again'

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from floor_plans.parameters import AT_STATION
 from patrol_policy.battery import Battery
 from patrol_policy.decision import QUIET, RECHARGE, REQUEST, DecisionSettings
-from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
 from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
-from strict_files.files import FileError
 from strict_files.settings import parameter, parameters
 from surveillance_behaviour.charging import BatteryMonitor, charge
+from surveillance_behaviour.mission.dock_state import DockState
 from surveillance_behaviour.mission.mission_log import (
-    Looked,
+    InspectionLog,
     MissionRecord,
     is_other_simulation,
 )
+from surveillance_behaviour.mission.mission_notes import MissionNotes
 from surveillance_behaviour.mission.recovery import Failure, Recovery, RecoveryLimits
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 
-SAME_POINT = 0.2
-"""A station within this distance of its room's point is at it, metres."""
 QUIET_SECONDS = 60.0
 """How long the robot stays at its station before it is decided anew, seconds."""
 
@@ -92,9 +89,8 @@ class Mission:
         astray: Whether it has left its place and not arrived anywhere since.
         staying: Why it was decided to stay where it is for a while; empty: it was not.
         explored: Seconds for which it explored its place since it came there; inf: it is done.
-        looked: What was looked at in each place.
-        goes_on: Whether an earlier run of the same record is gone on with.
-        docking: Whether a drive to a recharge room ends at its station, not at the room's point.
+        dock: Whether it is docked, and whether its drive ends at a station.
+        notes: What it writes down.
     """
 
     def __init__(
@@ -119,18 +115,13 @@ class Mission:
         self.astray = False
         self.staying = ''
         self.explored = 0.0
-        self.docking = False
-        # Where it starts in a recharge room, it starts at the station.
-        self._docked = self._will_dock = True
-        self._record = record
-        self._cut_off = None if record is None else record.left_at
-        self.goes_on = record is not None and record.is_begun
-        self.looked = Looked(None if record is None else record.looked.to_json())
-        self._started: float | None = None
-        self._noted_places: frozenset[str] = frozenset()
-        self._noted_threshold = 0.0
-        self._noted_promises: tuple[Promise, ...] = ()
-        self._record_complaint = ''
+        self.dock = DockState()
+        self.notes = MissionNotes(record, self.now, lambda line: self.say(line, warning=True))
+
+    @property
+    def looked(self) -> InspectionLog:
+        """What was looked at in each place."""
+        return self.notes.looked
 
     # The way of the mission.
 
@@ -143,7 +134,7 @@ class Mission:
         reasoner = self.ports.reasoner
         self.place = reasoner.begin(self.now(), interrupt)
         self.say(f'{len(reasoner.places)} places to patrol, starting in {self.place}')
-        if self._started is not None:
+        if self.notes.is_begun:
             return
         if self.ports.looking is not None:
             # Whoever ended before may have left it turned aside.
@@ -152,17 +143,9 @@ class Mission:
             # Where they are is known then, also while the map does not answer.
             with contextlib.suppress(CallError):
                 self.ports.places.position(station + AT_STATION, interrupt)
-        self._started = self.now()
-        self._noted_places = reasoner.places
-        self._noted_threshold = self.settings.choice.urgency_threshold
-        self.note(
-            'start',
-            machine=self.machine,
-            place=self.place,
-            places=sorted(reasoner.places),
-            urgency_threshold=self._noted_threshold,
+        before = self.notes.start(
+            self.machine, self.place, reasoner.places, self.settings.choice.urgency_threshold
         )
-        before, self._cut_off = self._cut_off, None
         if before is None or is_other_simulation(before.time, self.now()):
             return
         self.astray = before.left
@@ -204,35 +187,16 @@ class Mission:
             self.place = decision.from_place
         self.heading_to = decision.place
         self.pending = decision
-        self.docking = decision.rule in (RECHARGE, QUIET, REQUEST)
-        if reasoner.places != self._noted_places:
-            self._noted_places = reasoner.places
-            self.note('map', places=sorted(self._noted_places))
-        threshold, changed = self.settings.choice.urgency_threshold, {}
-        if threshold != self._noted_threshold:
-            self._noted_threshold = threshold
-            changed = {'urgency_threshold': threshold}
-        fields = {'place': decision.place, 'rule': decision.rule, 'reason': decision.reason}
-        self.note('decision', **fields, **changed)
-        self._note_promises()
+        self.dock.to_station = decision.rule in (RECHARGE, QUIET, REQUEST)
+        self.notes.decided(
+            decision.place,
+            decision.rule,
+            decision.reason,
+            reasoner.places,
+            self.settings.choice.urgency_threshold,
+        )
+        self.notes.promised(reasoner.promised)
         return decision
-
-    def _note_promises(self) -> None:
-        """Record what can be kept of the places, once its verdicts have changed."""
-        found = self.ports.reasoner.promised
-        before = {each.place: each.verdict for each in self._noted_promises}
-        if {each.place: each.verdict for each in found} != before:
-            self._noted_promises = found
-            self.note(
-                'promises',
-                places=[
-                    {
-                        name: None if isinstance(value, float) and math.isinf(value) else value
-                        for name, value in vars(each).items()
-                    }
-                    for each in found
-                ],
-            )
 
     def _notice_place(self, interrupt: Interrupt) -> None:
         """Record where the robot stands, if a drive ended elsewhere than it was to.
@@ -242,7 +206,7 @@ class Mission:
         here = self.ports.ontology.await_place(self.place, 0.0, interrupt)
         if here not in (self.place, ''):
             self.place = here
-            self._docked = False
+            self.dock.strayed()
             self.note('visit', place=here, distance=0.0)
 
     def watch_ways(self, interrupt: Interrupt) -> Callable[[], bool]:
@@ -270,18 +234,15 @@ class Mission:
             CallError: The map does not have it.
         """
         places = self.ports.places
-        point = places.position(place, interrupt)
-        self._will_dock = False
-        if place not in self.settings.choice.recharge_rooms:
-            return place, point
-        try:
-            station = places.position(place + AT_STATION, interrupt)
-        except UnknownPlaceError:
-            # The map is another program's, which knows of no stations.
-            self._will_dock = True
-            return place, point
-        self._will_dock = self.docking or math.dist(point[:2], station[:2]) <= SAME_POINT
-        return (place + AT_STATION, station) if self.docking else (place, point)
+        point, station = places.position(place, interrupt), None
+        can_charge = place in self.settings.choice.recharge_rooms
+        if can_charge:
+            # The map may be another program's, which knows of no stations.
+            with contextlib.suppress(UnknownPlaceError):
+                station = places.position(place + AT_STATION, interrupt)
+        if self.dock.leaves_for(point, station, is_recharge_room=can_charge) and station:
+            return place + AT_STATION, station
+        return place, point
 
     def departs(self) -> None:
         """Note that the robot leaves its place; until it arrives it may be anywhere."""
@@ -316,16 +277,14 @@ class Mission:
     def _visit(self, place: str, distance: float, path: Sequence[Point] = ()) -> None:
         self.place = place
         self.astray = False
-        self._docked = self._will_dock
+        self.dock.arrived()
         self.explored = 0.0
-        planned = {'path': _rounded(path)} if path else {}
-        self.note('visit', place=place, distance=distance, **planned, **self._driven())
+        self.notes.visited(place, distance, path, self._driven())
 
-    def _driven(self) -> dict[str, list[list[float]]]:
-        """Return the way driven since the last visit or failure, as a field of a record."""
+    def _driven(self) -> Sequence[Point]:
+        """Return the way driven since the last visit or failure; empty where nobody tells."""
         motion = self.ports.motion
-        points = [] if motion is None else motion.driven()
-        return {'driven': _rounded(points)} if points else {}
+        return [] if motion is None else motion.driven()
 
     def charge(
         self, interrupt: Interrupt, recharge: Callable[[Interrupt], None] | None = None
@@ -362,7 +321,7 @@ class Mission:
         self.failure = Failure(what, reason, goal, charging, is_over)
         self.pending = None
         self.ports.reasoner.disturbed()
-        self.note('failure', what=what, reason=reason, **self._driven())
+        self.notes.failed(what, reason, self._driven())
         self.say(f'{what} failed: {reason}', warning=True)
 
     # What is known.
@@ -374,7 +333,7 @@ class Mission:
         """
         stations = self.settings.choice.recharge_rooms
         good = [place for place in stations if place not in self.recovery.avoided(self.now())]
-        docked = self._docked or bool(self.battery.charging)
+        docked = self.dock.is_docked or bool(self.battery.charging)
         return docked and self.place in (good or stations) and not self.astray
 
     def charged_enough(self) -> bool:
@@ -392,21 +351,6 @@ class Mission:
         """Announce something."""
         self.ports.announcer.say(text, warning=warning)
 
-    def note(self, event: str, **fields: object) -> None:
-        """Record an event once the mission has begun, failures always."""
-        if self._record is None or (self._started is None and event != 'failure'):
-            return
-        try:
-            self._record.write(event, self.now(), **fields)
-        except FileError as error:
-            # A full disk is no reason to stop patrolling; once is enough to say so.
-            if str(error) != self._record_complaint:
-                self._record_complaint = str(error)
-                self.say(str(error), warning=True)
-        else:
-            self._record_complaint = ''
-
-
-def _rounded(points: Sequence[Point]) -> list[list[float]]:
-    """Return points as a record has them: x and y in whole centimetres."""
-    return [[round(x, 2), round(y, 2)] for x, y, *_ in points]
+    def note(self, event: str, /, **fields: object) -> None:
+        """Write an entry of the log once the mission has begun."""
+        self.notes.write(event, **fields)

@@ -100,7 +100,7 @@ class MissionRecord:
         return self._account.now is not None
 
     @property
-    def looked(self) -> Looked:
+    def looked(self) -> InspectionLog:
         """What was looked at in each place."""
         return self._account.looked
 
@@ -187,7 +187,7 @@ MOST_LOOKED = 200
 """So much is kept of each place."""
 
 
-class Looked:
+class InspectionLog:
     """What was looked at in each place, so that what waits longest comes first.
 
     That is a side (`side_name`), a point from which the place was looked at (`stand_name`), or a
@@ -268,7 +268,7 @@ class Account:
     last: RecordEntry | None = None
     left_at: CutOff | None = None
     visits: dict[str, float] = field(default_factory=dict)
-    looked: Looked = field(default_factory=Looked)
+    looked: InspectionLog = field(default_factory=InspectionLog)
 
     def take(self, event: RecordEntry) -> None:
         """Count one event.
@@ -335,7 +335,7 @@ class Account:
                 left_at = replace(left_at, explored=math.inf)
             self.summary, self.left_at = summary, left_at
             self.last_seen, self.visits = _times(kept['last_seen']), _times(kept['visits'])
-            self.looked = Looked(kept.get('looked', {}))
+            self.looked = InspectionLog(kept.get('looked', {}))
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FileError(f'a snapshot of the mission record is damaged: {error}') from None
 

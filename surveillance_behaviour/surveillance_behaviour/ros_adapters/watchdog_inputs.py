@@ -1,4 +1,4 @@
-"""What `PurposeWatch` is given on the robot: what robot_behavior hears and knows, once a second."""
+"""What `MissionWatchdog` is given once a second: what robot_behavior hears and knows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from std_msgs.msg import Bool
 
 import state_machines as fsm
 from surveillance_behaviour.mission.mission import Mission
-from surveillance_behaviour.mission.purpose import DRIVE_RECOVERY, PurposeWatch, Seen
+from surveillance_behaviour.mission.mission_watchdog import (
+    DRIVE_RECOVERY,
+    MissionSight,
+    MissionWatchdog,
+)
 from surveillance_behaviour.ros_adapters.peers import Deadlines, RosAnnouncer, active_path
 from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import pose_of_serialized
@@ -23,7 +27,7 @@ PERIOD = 1.0
 """Seconds of real time between two looks."""
 
 
-class PurposeFeed:
+class WatchdogInputs:
     """Looks at a mission once a second, in the executor's thread.
 
     Args:
@@ -53,7 +57,7 @@ class PurposeFeed:
         self._pose: bytes | None = None
         self._closed: tuple[str, ...] = ()
         self._stopped = False
-        self._watch = PurposeWatch(node.incidents, self._explained)
+        self._watch = MissionWatchdog(node.incidents, self._explained)
         StateSubscription(
             node,
             PoseWithCovarianceStamped,
@@ -87,7 +91,7 @@ class PurposeFeed:
             with contextlib.suppress(ValueError):
                 pose = pose_of_serialized(self._pose)
         self._watch.look(
-            Seen(
+            MissionSight(
                 self._elapsed(),
                 '/'.join(active_path(self._machine)),
                 announcer.words,

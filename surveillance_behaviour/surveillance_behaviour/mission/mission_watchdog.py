@@ -1,7 +1,7 @@
 """A watchdog for the mission's purpose: it tells when the robot does nothing, and why that is so.
 
-Processes that live are no proof that a mission goes on. Once a second `PurposeWatch` is given what
-there is to be seen of it, and begins and ends incidents:
+Processes that live are no proof that a mission goes on. Once a second `MissionWatchdog` is given
+what there is to be seen of it, and begins and ends incidents:
 
 - the robot waits for help, with the cause of the failure;
 - it is paused, stopped or waiting while its charge falls below what takes it home;
@@ -33,7 +33,7 @@ HELP = ('robot', 'help')
 
 
 @dataclass(frozen=True)
-class Seen:
+class MissionSight:
     """What is to be seen of a mission at one moment.
 
     Attributes:
@@ -69,7 +69,7 @@ class Seen:
     staying: str = ''
 
 
-class PurposeWatch:
+class MissionWatchdog:
     """Begins and ends the incidents of one mission.
 
     Args:
@@ -80,19 +80,19 @@ class PurposeWatch:
     def __init__(self, incidents: Incidents, explains: Callable[[str], float]) -> None:
         self._incidents = incidents
         self._explains = explains
-        self._before: Seen | None = None
+        self._before: MissionSight | None = None
         self._since = 0.0
         self._looks = 0
         self._help: tuple[str, str] | None = None
         self._told_charge = False
 
-    def look(self, seen: Seen) -> None:
+    def look(self, seen: MissionSight) -> None:
         """Take what is to be seen now."""
         self._look_at_help(seen)
         self._look_at_charge(seen)
         self._look_at_purpose(seen)
 
-    def _look_at_help(self, seen: Seen) -> None:
+    def _look_at_help(self, seen: MissionSight) -> None:
         if seen.waiting:
             if self._help is None:
                 self._help = cause_of(seen.failure, seen.closed)
@@ -101,7 +101,7 @@ class PurposeWatch:
             self._incidents.end(self._help, f'the mission goes on in {seen.place}')
             self._help = None
 
-    def _look_at_charge(self, seen: Seen) -> None:
+    def _look_at_charge(self, seen: MissionSight) -> None:
         why_held = seen.held or ('waiting for help' if seen.waiting else '')
         if why_held and seen.must_charge and not seen.charging:
             if not self._told_charge:
@@ -116,7 +116,7 @@ class PurposeWatch:
             self._told_charge = False
             self._incidents.end(CHARGE, 'the robot is on its way, or charges')
 
-    def _look_at_purpose(self, seen: Seen) -> None:
+    def _look_at_purpose(self, seen: MissionSight) -> None:
         before, self._before = self._before, seen
         if before is None or _goes_on(before, seen):
             self._since, self._looks = seen.now, 0
@@ -133,7 +133,7 @@ class PurposeWatch:
             self._incidents.begin(PURPOSE, text, Severity.ALARM)
 
 
-def _goes_on(before: Seen, seen: Seen) -> bool:
+def _goes_on(before: MissionSight, seen: MissionSight) -> bool:
     """Tell whether something has happened, or somebody knows why not."""
     if seen.held or seen.waiting or seen.staying:
         return True
@@ -146,12 +146,12 @@ def _goes_on(before: Seen, seen: Seen) -> bool:
     return any(abs(a - b) > MOVED for a, b in zip(before.pose, seen.pose, strict=True))
 
 
-def _with_mark(before: Seen, seen: Seen) -> Seen:
+def _with_mark(before: MissionSight, seen: MissionSight) -> MissionSight:
     level = before.level if before.level is not None else seen.level
     return replace(seen, pose=before.pose, level=level)
 
 
-def _step(seen: Seen) -> str:
+def _step(seen: MissionSight) -> str:
     """Return which step the mission waits for."""
     state = seen.state.upper()
     if 'MOV' in state or 'CONTROL' in state:
@@ -180,7 +180,7 @@ def cause_of(failure: Failure | None, closed: Sequence[str]) -> tuple[str, str]:
     return ('place', failure.goal) if failure.goal else HELP
 
 
-def text_of(seen: Seen) -> str:
+def text_of(seen: MissionSight) -> str:
     """Return what the robot waits for, with what is known of the cause."""
     doors = ''
     if seen.closed and seen.failure is not None and seen.failure.is_over is None:

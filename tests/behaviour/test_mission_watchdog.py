@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from surveillance_behaviour.mission.purpose import PATIENCE, PurposeWatch, Seen
+from surveillance_behaviour.mission.mission_watchdog import PATIENCE, MissionSight, MissionWatchdog
 from surveillance_behaviour.mission.recovery import Failure
 from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
 
-MOVING = Seen(0.0, 'MOVE_TO_NEXT_ROOM', pose=(1.0, 2.0, 0.0), level=80.0, place='C1')
+MOVING = MissionSight(0.0, 'MOVE_TO_NEXT_ROOM', pose=(1.0, 2.0, 0.0), level=80.0, place='C1')
 
 
-def watch(explained: float = 0.0) -> tuple[PurposeWatch, list[IncidentUpdate]]:
+def watch(explained: float = 0.0) -> tuple[MissionWatchdog, list[IncidentUpdate]]:
     told: list[IncidentUpdate] = []
-    return PurposeWatch(Incidents(told.append), lambda _state: explained), told
+    return MissionWatchdog(Incidents(told.append), lambda _state: explained), told
 
 
 def test_a_mission_that_stands_still_says_which_step_it_waits_for() -> None:
