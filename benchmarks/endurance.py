@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.whole_stack import ROOT, Stack
+from floor_plans.facts import graph_over_doors
 from state_machines.ros import ServiceCaller
 from surveillance_behaviour.mission.mission_log import summarize
 from surveillance_controllers.battery import BatteryParameters
@@ -44,7 +45,6 @@ from surveillance_interfaces.srv import (
     SlipOdometry,
 )
 from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
-from surveillance_operator.map_command import graph_over_doors
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.event_log import RecordEntry, read_all
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

@@ -25,12 +25,12 @@ from benchmarks.sizes import sized_parser
 from benchmarks.tables import table
 from benchmarks.whole_stack import ROOT
 from floor_plans import Grid
+from floor_plans.facts import graph_over_doors
 from floor_plans.occupancy_grid import distance_to
 from lidar_navigation.exploration.exploration import Exploration, Phase
 from lidar_navigation.exploration.frontiers import FrontierParameters
 from lidar_navigation.exploration.map_building import MapBuilder
 from lidar_navigation.geometry import Pose, Scan, composed, relative
-from surveillance_operator.map_command import graph_over_doors
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot

@@ -30,9 +30,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.fleet_stack import CONFIG, FleetStack
 from benchmarks.tables import table
+from floor_plans.facts import graph_over_doors
 from patrol_policy.fleet.partition import fleet_plan
 from surveillance_interfaces.msg import Decision, FleetRobot
-from surveillance_operator.map_command import graph_over_doors
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
 __all__ = ['CONFIG', 'compare_places', 'patrol']

@@ -27,8 +27,8 @@ from benchmarks.localisation import print_table
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.whole_stack import ROOT, Stack
 from floor_plans import read_place
+from floor_plans.imports import ImportRequest, import_place
 from floor_plans.occupancy_map import read_map, write_map
-from surveillance_operator.place_import import ImportRequest, import_place
 
 PATIENCE = 300.0
 """So long in real time without a simulated second, and the run has failed, seconds."""

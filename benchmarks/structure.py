@@ -407,7 +407,7 @@ def named_tests(modules: Mapping[str, Path]) -> tuple[set[str], set[str]]:
         for folder in some.parents
         if (folder / 'pyproject.toml').is_file() and (folder / 'launch.py').is_file()
     )
-    testable = {name for name in modules if not name.endswith('__init__')}
+    testable = {name for name in modules if not name.endswith(('__init__', '__main__'))}
     lacking = set()
     for name in testable:
         path = modules[name].relative_to(checkout)

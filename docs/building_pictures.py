@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from floor_plans import read_place
+from floor_plans.imports import ImportRequest, import_place
 from floor_plans.occupancy_map import write_map
-from surveillance_operator.place_import import ImportRequest, import_place
 from surveillance_operator.place_page.edit_command import editor_page
 from tests.operator.browser import DESK, Viewer
 from tests.operator.test_place_page import drop_of

@@ -126,10 +126,10 @@ def run_exploration(options: argparse.Namespace, config: Path, runs: Path) -> in
 
 def close(folder: Path, options: argparse.Namespace, config: Path) -> int:
     """Take the map out of the run's folder, make a place of it; return the exit code."""
+    from floor_plans.imports import ImportRequest, import_place
     from floor_plans.occupancy_map import read_map, write_map
     from launcher.run_configuration import profile_of
     from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE
-    from surveillance_operator.place_import import ImportRequest, import_place
 
     found = folder / MAP_FILE
     if not found.exists():

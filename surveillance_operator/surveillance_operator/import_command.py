@@ -2,74 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Sequence
-from pathlib import Path
 
-from floor_plans import ROBOT_RADIUS
-from surveillance_operator.place_import import ImportRequest, import_place
-from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
-
-
-def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
-    parser = CommandParser(
-        prog='launch.py import',
-        description="Makes a place of a map: finds rooms and doors, writes the place's file and "
-        'draws it.',
-    )
-    parser.add_argument(
-        'map',
-        type=Path,
-        metavar='FILE',
-        help="a map in map_server's format, a picture, Open-RMF's building.yaml, or a graph of "
-        'patrolling_sim, Nav2 or Open-RMF',
-    )
-    parser.add_argument(
-        '--out', type=Path, metavar='PLACE', help="the place's file (default: FILE_place.yaml here)"
-    )
-    parser.add_argument(
-        '--labels', type=Path, metavar='PNG', help='also write the rooms as a picture: 0 in none'
-    )
-    parser.add_argument(
-        '--resolution', type=float, metavar='M', help="side of a picture's pixel, metres"
-    )
-    parser.add_argument(
-        '--level', default='', metavar='NAME', help='the level of a building that has several'
-    )
-    parser.add_argument(
-        '--robot-radius',
-        type=float,
-        default=ROBOT_RADIUS,
-        metavar='M',
-        help=f'radius of the robot, metres (default: {ROBOT_RADIUS:g})',
-    )
-    parser.add_argument(
-        '--force', action='store_true', help='write over a place that is there already'
-    )
-    options = parser.parse_args(argv)
-    if not 0.01 <= options.robot_radius <= 5.0:
-        parser.error(f'--robot-radius {options.robot_radius:g}: expected 0.01 to 5')
-    return options
+from floor_plans.imports import command
+from surveillance_runtime.command_line import CommandParser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Make a place of a map and say what was found; the exit code is 2 for bad input."""
-    options = _parse(argv)
-    try:
-        lines = import_place(
-            ImportRequest(
-                source=options.map,
-                out=options.out,
-                radius=options.robot_radius,
-                resolution=options.resolution,
-                level=options.level,
-                labels=options.labels,
-                force=options.force,
-            )
-        )
-    except ValueError as error:
-        print(f'import: {error}', file=sys.stderr)
-        return EXIT_BAD_INPUT
-    print('\n'.join(lines))
-    return 0
+    return command.main(argv, CommandParser(prog='launch.py import'))

@@ -17,10 +17,11 @@ from pathlib import Path
 
 from floor_plans import FloorPlan, read_place
 from floor_plans.drawing import DrivenRun, draw_place
+from floor_plans.facts import counted, facts, graph_over_doors
 from patrol_policy.promises import lines as promise_lines
 from strict_files.files import FileError, replace_text
 from surveillance_behaviour.mission import mission_log
-from surveillance_operator.map_command import counted, facts, graph_over_doors, in_words, run_of
+from surveillance_operator.map_command import in_words, run_of
 from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, robots_of, run_parser
 from surveillance_operator.run_entries import RunEntries, entries_of_run, incidents_of

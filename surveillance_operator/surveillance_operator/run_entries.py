@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from surveillance_operator.map_command import counted
+from floor_plans.facts import counted
 from surveillance_runtime.event_log import (
     RecordEntry,
     on_one_clock,

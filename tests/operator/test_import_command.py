@@ -1,169 +1,32 @@
-"""The command `import`: rooms and doors of a map, the place it writes, and what it refuses."""
+"""The command `import` of the robot: the library's, with the words of the robot's commands."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 
-from floor_plans import RoomMap, read_place
+from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
 from surveillance_operator.import_command import main
-
-pytestmark = pytest.mark.early
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
 
-def mapped(folder: Path, place: str, yaw: float = 0.0, resolution: float = 0.05) -> Path:
-    """Draw one of the project's places as the map that a robot would have of it."""
-    grid = read_place(CONFIG / f'{place}.yaml').plan.grid(resolution)
-    cells = grid.cells[::-1]
-    write_map(folder / f'{place}.yaml', cells, resolution, (*grid.origin, yaw))
-    return folder / f'{place}.yaml'
-
-
-def hall(folder: Path) -> Path:
-    cells = np.full((120, 200), -1, np.int8)
-    cells[10:110, 10:190] = 0
-    cells[[10, 109], 10:190] = cells[10:110, 10] = cells[10:110, 189] = 100
-    for row, column in ((30, 50), (30, 60), (38, 50), (38, 60), (70, 120)):
-        cells[row : row + 2, column : column + 2] = 100  # a table's legs, a chair
-    write_map(folder / 'hall.yaml', cells, 0.05, (0.0, 0.0, 0.0))
-    return folder / 'hall.yaml'
-
-
-@pytest.mark.parametrize('yaw', [0.0, 0.35])
-def test_the_seven_rooms_are_found_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], yaw: float
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    path = mapped(tmp_path, 'seven_rooms', yaw)
-    assert main([str(path), '--labels', 'rooms.png']) == 0
-    assert '7 doors' in capsys.readouterr().out
-    found = read_place(tmp_path / 'seven_rooms_place.yaml').plan
-    true = read_place(CONFIG / 'seven_rooms.yaml').plan
-    assert found.map is not None
-    assert len(found.place.rooms) == 7
-    regions = RoomMap(found)
-    rooms = {}
-    for name, (x, y, _) in true.place.positions.items():
-        (own,) = found.map.to_world([(x - found.map.origin[0], y - found.map.origin[1])])
-        rooms[name] = regions.room_at(*own)
-    assert len(set(rooms.values())) == 7
-    pairs = {frozenset(rooms[side] for side in sides) for sides in true.place.doors.values()}
-    assert {frozenset(sides) for sides in found.place.doors.values()} == pairs
-    assert [door.width for door in found.doors.values()] == pytest.approx([1.2] * 7, abs=0.2)
-    labels: Any = cv2.imread(str(tmp_path / 'rooms.png'), cv2.IMREAD_UNCHANGED)
-    assert labels.shape == found.map.cells.shape
-    assert set(np.unique(labels)) == set(range(8))
-
-
-def test_an_office_of_forty_rooms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main([str(mapped(tmp_path, 'office', resolution=0.1))]) == 0
-    found = read_place(tmp_path / 'office_place.yaml').plan
-    rooms = [name for name in found.place.rooms if name.startswith('R')]
-    assert 40 <= len(rooms) <= 42  # the lobby is no corridor
-
-
-def test_one_hall_is_one_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main([str(hall(tmp_path)), '--out', 'place.yaml']) == 0
-    assert list(read_place(tmp_path / 'place.yaml').place.rooms) == ['R1']
-
-
-def test_the_end_of_what_is_known_is_no_wall(
+def test_a_robots_map_becomes_a_place_that_says_how(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    path = hall(tmp_path)
-    pixels: Any = cv2.imread(str(tmp_path / 'hall.png'), cv2.IMREAD_GRAYSCALE)
-    pixels[70:109, 30:70] = 205
-    cv2.imwrite(str(tmp_path / 'hall.png'), pixels)
-    assert main([str(path), '--out', 'place.yaml']) == 0
-    assert list(read_place(tmp_path / 'place.yaml').place.rooms) == ['R1']
+    grid = read_place(CONFIG / 'seven_rooms.yaml').plan.grid()
+    write_map(tmp_path / 'flat.yaml', grid.cells[::-1], grid.resolution, (*grid.origin, 0.0))
+    assert main(['flat.yaml']) == 0
+    assert 'Written by: launch.py import flat.yaml' in (tmp_path / 'flat_place.yaml').read_text()
 
 
-def test_what_cannot_be_imported_costs_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    path = hall(tmp_path)
-    (tmp_path / 'there.yaml').touch()
-    for words, expected in (
-        (['nowhere.yaml'], 'nowhere.yaml'),
-        ([str(path), '--out', 'there.yaml'], 'there.yaml: is there already'),
-        ([str(path), '--out', 'place.txt'], 'ends in .yaml'),
-        ([str(path), '--robot-radius', '4'], 'fits nowhere'),
-        (['hall.png'], 'says nothing of its scale'),
-        ([str(path), '--resolution', '0.05'], 'says its own resolution'),
-    ):
-        assert main(words) == 2
-        said = capsys.readouterr().err
-        assert expected in said
-        assert said.count('\n') == 1
-    assert not (tmp_path / 'hall_place.yaml').exists()
-
-
-def test_a_picture_with_its_scale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    hall(tmp_path)
-    assert main(['hall.png', '--resolution', '0.05', '--out', 'place.yaml']) == 0
-    assert read_place(tmp_path / 'place.yaml').plan.map is not None
-
-
-GRAPHS = {
-    'three.graph': '3 400 300 0.05 -1.0 2.0\n0 0 0 1 1 E 60\n'
-    '1 60 0 2 0 W 60 2 N 40\n2 60 40 1 1 S 40\n',
-    'three.geojson': (
-        '{"type": "FeatureCollection", "features": ['
-        '{"type": "Feature", "properties": {"id": 0}, "geometry": {"type": "Point", '
-        '"coordinates": [-1.0, 2.0]}}, {"type": "Feature", "properties": {"id": 1}, "geometry": '
-        '{"type": "Point", "coordinates": [2.0, 2.0]}}, {"type": "Feature", '
-        '"properties": {"id": 2}, '
-        '"geometry": {"type": "Point", "coordinates": [2.0, 4.0]}}, {"type": "Feature", '
-        '"properties": {"id": 3, "startid": 0, "endid": 1}, "geometry": {"type": '
-        '"MultiLineString", "coordinates": [[[0, 0], [1, 1]]]}}, {"type": "Feature", "properties": '
-        '{"id": 4, "startid": 2, "endid": 1}, "geometry": {"type": "MultiLineString", '
-        '"coordinates": []}}]}'
-    ),
-    'three.yaml': (
-        'building_name: b\nlevels:\n  L1:\n    lanes:\n    - [0, 1, {}]\n    - [1, 0, {}]\n'
-        '    - [1, 2, {}]\n    vertices:\n    - [-1.0, 2.0, {name: ""}]\n'
-        '    - [2.0, 2.0, {name: ""}]\n    - [2.0, 4.0, {name: lounge}]\n'
-    ),
-}
-
-
-@pytest.mark.parametrize('name', GRAPHS)
-def test_a_graph_of_another_program_is_a_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / name).write_text(GRAPHS[name])
-    assert main([name, '--out', 'place.yaml']) == 0
-    place = read_place(tmp_path / 'place.yaml').place
-    third = 'lounge' if name == 'three.yaml' else 'R3'
-    assert place.positions == {'R1': (-1, 2, 0), 'R2': (2, 2, 0), third: (2, 4, 0)}
-    assert set(map(frozenset, place.doors.values())) == {
-        frozenset({'R1', 'R2'}),
-        frozenset({'R2', third}),
-    }
-
-
-@pytest.mark.parametrize('name', GRAPHS)
-def test_a_damaged_graph_costs_one_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+def test_an_unknown_option_is_answered_with_the_nearest(
     capsys: pytest.CaptureFixture[str],
-    name: str,
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    for text in (GRAPHS[name][: len(GRAPHS[name]) * 2 // 3], '', 'levels: 3\n', '{}'):
-        (tmp_path / name).write_text(text)
-        assert main([name, '--out', 'place.yaml']) == 2
-        assert capsys.readouterr().err.count('\n') == 1
+    with pytest.raises(SystemExit) as ended:
+        main(['map.yaml', '--lable', 'rooms.png'])
+    assert ended.value.code == 2
+    assert "unknown option '--lable': expected '--labels'" in capsys.readouterr().err

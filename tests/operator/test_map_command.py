@@ -79,13 +79,6 @@ def test_it_says_which_rooms_cannot_be_visited_in_time(
     assert map_command.main([*place, '--charge-lasts', '40']) == 2
 
 
-def test_the_tour_of_a_place_is_measured_over_the_doors() -> None:
-    plan = read_world(CONFIG / 'seven_rooms.yaml').plan
-    graph = map_command.graph_over_doors(plan)
-    assert graph.leg_seconds['C1']['R1'] == pytest.approx(1.5 + 1.5)
-    assert graph.leg_seconds['E']['C1'] == pytest.approx(np.hypot(2.0, 1.5) + np.hypot(3.0, 0.5))
-
-
 def test_a_run_is_drawn_with_its_waits(
     record: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

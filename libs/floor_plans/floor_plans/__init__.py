@@ -4,8 +4,9 @@ Begin with `read_place`: it reads a place's file, checks all of it, and returns 
 the rooms (`Place`) and the building around them (`FloorPlan`). `RoomMap` says which room a point
 lies in. `map_rooms.propose` finds rooms and doors in a map.
 
-Public modules: `drawing` (pictures of places), `editor` (changes, with undo), `filter_masks`
-(zones for Nav2), `fleet` (several robots of a place),
+Public modules: `drawing` (pictures of places), `editor` (changes, with undo), `facts`
+(what there is to say), `filter_masks` (zones for Nav2), `fleet` (several robots of a place),
+`imports` (places out of maps, buildings and graphs),
 `map_rooms` (finds rooms and doors), `occupancy_grid` (cells and what is measured on them),
 `occupancy_map` (maps in map_server's format), `parameters` (a place as parameters),
 `shapes` (points, lines, boxes), `writing` (the text of a place's file).

@@ -114,7 +114,7 @@ def map_file_beside(place: Path, name: str) -> str:
 
 
 def _importing(path: str | Path) -> str:
-    return f'expected a place; `python3 launch.py import {path}` makes one of it'
+    return f'expected a place; the command `import {path}` makes one of it'
 
 
 def checked_plan(parameters: Mapping[str, Any], radius: float = ROBOT_RADIUS) -> FloorPlan:

@@ -17,11 +17,10 @@ from typing import Any
 
 import yaml
 
+from floor_plans.imports import SUFFIXES, ImportRequest, import_place, is_levels
 from floor_plans.occupancy_map import PICTURES
 from strict_files.files import FileError, in_one_line
 from strict_files.yaml_file import read_yaml_file
-from surveillance_operator.graph_import import SUFFIXES
-from surveillance_operator.place_import import ImportRequest, import_place, is_levels
 
 MOST_BYTES = 48_000_000
 """Of all files together; as text they are a third longer."""

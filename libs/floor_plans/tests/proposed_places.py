@@ -1,6 +1,7 @@
 """What is proposed for some drawn buildings, as text.
 
-`python -m tests.runtime.proposed_places` writes the texts anew, after a change that is meant.
+`python -m libs.floor_plans.tests.proposed_places` writes the texts anew, after a change that is
+meant.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from floor_plans.parameters import zones_from
 
 from . import drawn_calls
 
-CONFIG = Path(__file__).parents[2] / 'config'
+CONFIG = Path(__file__).with_name('places')
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom edge, points of the picture."""
 
@@ -352,7 +352,7 @@ def test_a_zone_is_tinted_as_far_as_it_is_in_the_picture(
 def test_a_picture_is_drawn_as_it_was(picture: str) -> None:
     """Layout is a matter of many small numbers: what changes them is to be looked at.
 
-    `python -m tests.runtime.drawn_calls` takes what is drawn now.
+    `python -m libs.floor_plans.tests.drawn_calls` takes what is drawn now.
     """
     before = (drawn_calls.RECORDS / f'{picture}.txt').read_text('utf-8').splitlines()
     assert drawn_calls.recorded(*drawn_calls.PICTURES[picture]) == before

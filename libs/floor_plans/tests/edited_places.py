@@ -1,6 +1,6 @@
 """What each change of a place makes of its file, and what it says, as text.
 
-`python -m tests.runtime.edited_places` writes the text anew, after a change that is meant.
+`python -m libs.floor_plans.tests.edited_places` writes the text anew, after a change that is meant.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import yaml
 from floor_plans import RoomMap, read_place
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 
-CONFIG = Path(__file__).parents[2] / 'config'
+CONFIG = Path(__file__).with_name('places')
 RECORD = Path(__file__).with_name('edited_places.txt')
 STATIONS = {
     'E': {'pose': [5.0, 10.0, 0.0], 'rate': 4.0},

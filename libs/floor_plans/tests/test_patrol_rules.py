@@ -11,7 +11,7 @@ from floor_plans import PlaceError, read_place
 from floor_plans.parameters import patrol_rules
 from strict_files.files import FileError
 
-CONFIG = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
+CONFIG = Path(__file__).with_name('places') / 'seven_rooms.yaml'
 
 
 def test_a_file_says_what_differs_from_place_to_place(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """What the pictures of two places are drawn of, call by call, as text.
 
-`python -m tests.runtime.drawn_calls` writes the texts anew, after a change that is meant.
+`python -m libs.floor_plans.tests.drawn_calls` writes the texts anew, after a change that is meant.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from floor_plans import read_place
 from floor_plans.drawing import Canvas, DrivenRun, draw_place
 from floor_plans.parameters import zones_from
 
-CONFIG = Path(__file__).parents[2] / 'config'
+CONFIG = Path(__file__).with_name('places')
 RECORDS = Path(__file__).with_name('drawn')
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import resource
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -35,37 +34,6 @@ def test_what_is_no_file_is_neither_read_nor_replaced(tmp_path: Path, kind: str)
         with pytest.raises(OSError, match=f'expected a file, got {kind}'):
             write()
     assert not path.is_file()
-
-
-def test_drafts_of_killed_writers_do_not_add_up(tmp_path: Path) -> None:
-    old, new, other, backup, folder, link = (
-        tmp_path / name
-        for name in (
-            '.[a].0123abcd.draft',
-            '.[a].4567cdef.draft',
-            '.[b].0123abcd.draft',
-            '.[a].20260101',
-            '.[a].aaaaaaaa.draft',
-            '.[a].ffffffff.draft',
-        )
-    )
-    folder.mkdir()
-    link.symlink_to(other)
-    for path in (old, new, other, backup):
-        path.touch()
-    for path in (old, other, backup, folder):
-        os.utime(path, (0, 0))
-    replace_text(tmp_path / '[a]', 'new')
-    assert {*tmp_path.iterdir()} == {tmp_path / '[a]', new, other, backup, folder, link}
-
-
-@pytest.mark.parametrize('name', ['a' * 255, 'ä' * 127])
-def test_a_file_of_the_longest_name_is_replaced(tmp_path: Path, name: str) -> None:
-    path = tmp_path / name
-    path.touch()
-    replace_text(path, 'new')
-    assert path.read_text() == 'new'
-    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_a_file_is_read_up_to_a_bound(tmp_path: Path) -> None:
@@ -115,40 +83,6 @@ def test_a_file_that_cannot_be_replaced_is_named_and_stays_whole(tmp_path: Path)
     assert in_one_line(refused.value) == f'{path}: File too large'
     assert path.read_text() == 'old'
     assert os.listdir(tmp_path) == ['state.json'], 'a draft is left'
-
-
-def test_a_file_keeps_its_rights(tmp_path: Path) -> None:
-    (path := tmp_path / 'file').write_text('old')
-    path.chmod(0o600)
-    replace_text(path, 'new')
-    assert (path.read_text(), path.stat().st_mode & 0o777) == ('new', 0o600)
-
-
-def test_a_read_only_file_is_not_replaced() -> None:
-    user = os.geteuid()
-    with tempfile.TemporaryDirectory() as folder:
-        Path(folder).chmod(0o777)
-        (path := Path(folder) / 'file').write_text('old')
-        path.chmod(0o444)
-        os.seteuid(user or 65534)  # root may write everything
-        try:
-            with pytest.raises(PermissionError) as error:
-                replace_text(path, 'new')
-        finally:
-            os.seteuid(user)
-        assert error.value.filename == str(path)
-        assert path.read_text() == 'old'
-
-
-def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
-    (tmp_path / 'disk').mkdir()
-    path, link = tmp_path / 'disk' / 'state.json', tmp_path / 'link.json'
-    link.symlink_to(path)
-    for text in ('made', 'replaced'):
-        replace_text(link, text)
-        assert link.is_symlink()
-        assert path.read_text() == text
-    assert sorted(os.listdir(tmp_path / 'disk')) == ['state.json']
 
 
 def test_lines_go_to_where_a_link_points_behind_the_last_whole_one(tmp_path: Path) -> None:

@@ -14,10 +14,7 @@ from floor_plans.occupancy_map import read_map, write_map
 from floor_plans.writing import format_place
 from strict_files.files import FileError
 
-from . import edited_places
-
-pytestmark = pytest.mark.unit
-SEVEN = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
+SEVEN = Path(__file__).with_name('places') / 'seven_rooms.yaml'
 
 
 @pytest.fixture
@@ -202,12 +199,3 @@ def test_the_part_with_the_station_is_where_the_robot_charges(scanned: PlaceEdit
     assert scanned.now.plan.place.recharge_rooms == (other,)
     scanned.save()
     assert read_place(scanned.path).plan.stations[other].pose[:2] == (8.5, 12.0)
-
-
-def test_each_change_says_and_changes_what_it_did() -> None:
-    """What it should do is to be read in the record.
-
-    `python -m tests.runtime.edited_places` takes what each change does now.
-    """
-    before = edited_places.RECORD.read_text('utf-8').splitlines()
-    assert edited_places.recorded() == before

@@ -12,11 +12,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from floor_plans.imports.rmf_building import level_of
 from floor_plans.parameters import problem_in_name
-from patrol_policy.graph import GraphError
+from patrol_policy import GraphError
 from patrol_policy.patrolling_sim import read_patrolling_sim
 from strict_files.files import FileError, read_file
-from surveillance_operator.rmf_building import level_of
 
 MOST_BYTES = 20_000_000
 SUFFIXES = ('.graph', '.geojson', '.json')

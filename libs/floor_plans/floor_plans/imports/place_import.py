@@ -16,6 +16,9 @@ from PIL import Image
 
 from floor_plans import ROBOT_RADIUS, read_place
 from floor_plans.drawing import draw_place
+from floor_plans.facts import counted, facts
+from floor_plans.imports.graphs import SUFFIXES, read_graph
+from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import Proposal, propose
 from floor_plans.occupancy_grid import distance_to
 from floor_plans.occupancy_map import (
@@ -28,9 +31,6 @@ from floor_plans.parameters import problem_in_name
 from floor_plans.writing import format_place
 from strict_files.files import FileError, in_one_line, read_file, replace_text
 from strict_files.yaml_file import read_yaml_file
-from surveillance_operator.graph_import import SUFFIXES, read_graph
-from surveillance_operator.map_command import counted, facts
-from surveillance_operator.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 
 MOST_BYTES = 20_000_000
 """Of a YAML file; a picture may be larger."""
@@ -48,6 +48,7 @@ class ImportRequest:
         level: The level of a building that has several.
         labels: Where to write the rooms as a picture; None: nowhere.
         force: Whether to write over a place that is there already.
+        command: What a person typed, for the head of the place's file; empty: nothing.
     """
 
     source: Path
@@ -57,11 +58,17 @@ class ImportRequest:
     level: str = ''
     labels: Path | None = None
     force: bool = False
+    command: str = ''
 
     @property
     def place(self) -> Path:
         """The place's file."""
         return self.out or Path(f'{self.source.stem.removesuffix(".building")}_place.yaml')
+
+    @property
+    def origin(self) -> str:
+        """Where the place comes from, for the head of its file."""
+        return f'Written by: {self.command}' if self.command else f'Made of: {self.source}'
 
 
 def import_place(request: ImportRequest) -> list[str]:
@@ -137,10 +144,9 @@ def _written(
         write_labels(proposal, request.labels)
         lines.append(f'rooms as a picture: {request.labels}')
     title = (
-        f'{found}\nWritten by: python3 launch.py import {request.source}\n'
+        f'{found}\n{request.origin}\n'
         'Metres and radians in the frame of the map. Rename rooms and doors as you like;\n'
-        'a door is x, y, direction of the opening, width.\n'
-        '`python3 launch.py map FILE` checks and draws it.'
+        'a door is x, y, direction of the opening, width.'
     )
     picture = out.with_suffix('.png')
     kept = {request.source, request.source.with_suffix('.png'), _picture_of(request.source)}
@@ -184,7 +190,7 @@ def _import_graph(request: ImportRequest, document: Any) -> list[str]:
         )
     parameters = read_graph(source, document, request.level)
     said = f'{counted(len(parameters["map"]), "room")} of a graph'
-    title = f'{said}\nWritten by: python3 launch.py import {source}'
+    title = f'{said}\n{request.origin}'
     text = format_place(parameters, title)
     return [f'{source}: {said}', *_draw(request, text, request.place.with_suffix('.png'))]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from floor_plans import RoomMap, read_place
-from surveillance_operator.import_command import main
+from floor_plans.imports.command import main
 
 HALF = """\
   {name}:

@@ -1,0 +1,11 @@
+"""A place made of what there is already: a robot's map, a drawn building, another program's graph.
+
+`import_place` looks at the file, makes the place, writes and draws it. Read from the bottom up:
+`rmf_building` draws a level of Open-RMF's building.yaml as a map, `graphs` reads graphs of
+patrolling_sim, of Nav2's route server and of Open-RMF, `place_import` does the rest.
+"""
+
+from floor_plans.imports.graphs import SUFFIXES as SUFFIXES
+from floor_plans.imports.place_import import ImportRequest as ImportRequest
+from floor_plans.imports.place_import import import_place as import_place
+from floor_plans.imports.place_import import is_levels as is_levels

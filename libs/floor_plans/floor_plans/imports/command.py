@@ -1,0 +1,81 @@
+"""The command that makes a place of a map: `python -m floor_plans.imports FILE`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from floor_plans.imports.place_import import ImportRequest, import_place
+from floor_plans.room_map import ROBOT_RADIUS
+
+EXIT_BAD_INPUT = 2
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Give a command's parser the options of an import."""
+    parser.description = (
+        "Makes a place of a map: finds rooms and doors, writes the place's file and draws it."
+    )
+    parser.add_argument(
+        'map',
+        type=Path,
+        metavar='FILE',
+        help="a map in map_server's format, a picture, Open-RMF's building.yaml, or a graph of "
+        'patrolling_sim, Nav2 or Open-RMF',
+    )
+    parser.add_argument(
+        '--out', type=Path, metavar='PLACE', help="the place's file (default: FILE_place.yaml here)"
+    )
+    parser.add_argument(
+        '--labels', type=Path, metavar='PNG', help='also write the rooms as a picture: 0 in none'
+    )
+    parser.add_argument(
+        '--resolution', type=float, metavar='M', help="side of a picture's pixel, metres"
+    )
+    parser.add_argument(
+        '--level', default='', metavar='NAME', help='the level of a building that has several'
+    )
+    parser.add_argument(
+        '--robot-radius',
+        type=float,
+        default=ROBOT_RADIUS,
+        metavar='M',
+        help=f'radius of the robot, metres (default: {ROBOT_RADIUS:g})',
+    )
+    parser.add_argument(
+        '--force', action='store_true', help='write over a place that is there already'
+    )
+
+
+def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | None = None) -> int:
+    """Make a place of a map and say what was found; the exit code is 2 for bad input.
+
+    Args:
+        argv: The words of the command line; None: those of the process.
+        parser: Of a program whose command this is.
+    """
+    parser = parser or argparse.ArgumentParser(prog='python -m floor_plans.imports')
+    add_options(parser)
+    options = parser.parse_args(argv)
+    if not 0.01 <= options.robot_radius <= 5.0:
+        parser.error(f'--robot-radius {options.robot_radius:g}: expected 0.01 to 5')
+    try:
+        lines = import_place(
+            ImportRequest(
+                source=options.map,
+                out=options.out,
+                radius=options.robot_radius,
+                resolution=options.resolution,
+                level=options.level,
+                labels=options.labels,
+                force=options.force,
+                command=f'{parser.prog} {options.map}',
+            )
+        )
+    except ValueError as error:
+        print(f'import: {error}', file=sys.stderr)
+        return EXIT_BAD_INPUT
+    print('\n'.join(lines))
+    return 0
