@@ -15,8 +15,8 @@ import pytest
 from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
 from launcher import cli
-from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
 from libs.floor_plans.tests.test_rmf_building import building, level
+from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
 
 PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
 ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
