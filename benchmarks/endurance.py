@@ -48,7 +48,7 @@ from surveillance_ontology.armor_client import CHANGES_QOS, CHANGES_TOPIC
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.event_log import RecordEntry, read_all
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 USUAL_SPEED = 0.45
 """Of a drive, m/s: acceleration, bends and doors included."""
@@ -291,7 +291,7 @@ class Trouble:
 
 def capacity_for(place: Path, ranges: float) -> float:
     """Return the energy of ways from the station to the farthest place and home, Wh."""
-    plan = read_world(place).plan
+    plan = read_simulated_place(place).plan
     graph = graph_over_doors(plan)
     home = plan.place.recharge_rooms[0]
     metres = max(graph.seconds(home, other) for other in plan.place.rooms)

@@ -34,7 +34,7 @@ from lidar_navigation.geometry import Pose, Scan, composed, relative
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 PLACES = ('seven_rooms', 'patrol_world', 'office')
 STEP = 0.1
@@ -60,7 +60,7 @@ class Explored:
 
 
 def explore(
-    world: World,
+    world: SimulatedPlace,
     seed: int,
     *,
     errors: float = 1.0,
@@ -109,7 +109,7 @@ def explore(
     )
 
 
-def compared(grid: Grid, world: World) -> tuple[float, float]:
+def compared(grid: Grid, world: SimulatedPlace) -> tuple[float, float]:
     """Return the share of the true free floor that a map has as free, and its walls' error.
 
     The floor is what is free and connected with the robot's start; the error is the 95th percentile
@@ -220,13 +220,15 @@ def main() -> int:
     rows = []
     kinds = (1.0, 5.0) if options.errors is None else (options.errors,)
     for file in names:
-        tour = graph_over_doors(read_world(file).plan).tour.length
+        tour = graph_over_doors(read_simulated_place(file).plan).tour.length
         for errors in kinds:
             noise = 0.01 if errors == 1.0 else 0.03
             for seed in range(options.seeds):
                 begun = time.process_time()
                 most = options.size.of(3600.0, 3600.0, 10.0)
-                did = explore(read_world(file), seed, errors=errors, noise=noise, most=most)
+                did = explore(
+                    read_simulated_place(file), seed, errors=errors, noise=noise, most=most
+                )
                 cpu = time.process_time() - begun
                 least = tour / BaseModel().speed
                 rows.append(

@@ -34,7 +34,7 @@ from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_ma
 from lidar_navigation.localisation.localisation import Localiser
 from lidar_navigation.localisation.odometry import OdometryBuffer, joined
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 Floats = npt.NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent
@@ -293,7 +293,9 @@ def on_log(path: Path) -> None:
     )
 
 
-def drive(world: World, late: float, sweep: float, seconds: float) -> Iterator[tuple[Any, ...]]:
+def drive(
+    world: SimulatedPlace, late: float, sweep: float, seconds: float
+) -> Iterator[tuple[Any, ...]]:
     """Yield truth, odometry and scan of a robot that drives to and fro, as they come.
 
     A scan begins at its stamp, takes `sweep` seconds, and comes `late` seconds after its stamp.
@@ -330,7 +332,7 @@ def drive(world: World, late: float, sweep: float, seconds: float) -> Iterator[t
 
 def late_scans(size: Size) -> None:
     """Print how late and swept scans change the estimate, with and without joining in time."""
-    world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
+    world = read_simulated_place(ROOT / 'config' / 'seven_rooms.yaml')
     grid = world.plan.grid(0.05)
     rows = []
     for late, sweep in ((0.0, 0.0), (0.1, 0.0), (0.3, 0.0), (0.1, 0.1), (0.3, 0.1)):

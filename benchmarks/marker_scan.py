@@ -27,7 +27,7 @@ from surveillance_perception.arm.scan import ScanPlan, aim_at, from_nearer_end
 from surveillance_perception.arm.trajectory import ArmState, motion_to
 from surveillance_perception.marker_registry import read_registry
 from surveillance_runtime.robot_arm import ARM
-from surveillance_simulation import Camera, Conditions, Renderer, read_world
+from surveillance_simulation import Camera, Conditions, Renderer, read_simulated_place
 from surveillance_simulation.camera.model import LIGHTINGS, expose
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
@@ -46,7 +46,7 @@ class ArmCamera:
     """
 
     def __init__(self, conditions: Conditions, wall_brightness: float, seed: int) -> None:
-        world = read_world(CONFIG / 'patrol_world.yaml')
+        world = read_simulated_place(CONFIG / 'patrol_world.yaml')
         world.wall_brightness = wall_brightness
         self._conditions, self._rng = conditions, np.random.default_rng(seed)
         self._renderer = Renderer(world, Camera.from_field_of_view())

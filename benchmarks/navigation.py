@@ -57,7 +57,7 @@ from surveillance_behaviour.experience import LegTimes
 from surveillance_runtime import node_table
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 Mask = npt.NDArray[np.bool_]
 
@@ -81,7 +81,7 @@ def median_ms(work: Callable[[], Any], budget: float) -> float:
 def grid_of(side: int) -> tuple[Grid, npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return a map of about side x side cells full of rooms, and two of its opposite corners."""
     rooms = max(2, round(side / 90))
-    world = World.from_parameters(regular_places.grid(rooms, rooms))
+    world = SimulatedPlace.from_parameters(regular_places.grid(rooms, rooms))
     cell = rooms * regular_places.ROOM / side
     drawn = world.plan.grid(cell, margin=0.0)
     half = regular_places.ROOM / 2
@@ -218,7 +218,7 @@ def _pairs(free: Mask, offset: tuple[int, int]) -> tuple[Any, Any]:
 
 def control(size: Size) -> None:
     """Time of one step of each part of a drive through the seven rooms, without any ROS."""
-    world = read_world(ROOT / 'config' / 'seven_rooms.yaml')
+    world = read_simulated_place(ROOT / 'config' / 'seven_rooms.yaml')
     robot = Robot(world, rng=np.random.default_rng(1))
     drawn = world.plan.grid()
     grid = drawn
@@ -279,7 +279,7 @@ class Drives:
 
 def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> Drives:
     """Drive from room to room among people, on the cores alone, for simulated seconds."""
-    world = read_world(ROOT / 'config' / place)
+    world = read_simulated_place(ROOT / 'config' / place)
     rng = np.random.default_rng(seed)
     people = People(world.plan, model, np.random.default_rng(seed + 1)) if model.count else None
     robot = Robot(world, rng=rng, people=people)
@@ -342,10 +342,10 @@ def people(size: Size) -> None:
 def kidnaps(size: Size) -> None:
     """Robots that are carried off while they drive: when they know where they are."""
     places = {
-        'seven_rooms': (read_world(ROOT / 'config' / 'seven_rooms.yaml'), 16),
-        'patrol_world': (read_world(ROOT / 'config' / 'patrol_world.yaml'), 10),
-        'office, rooms alike': (read_world(ROOT / 'config' / 'office.yaml'), 10),
-        'grid, all rooms alike': (World.from_parameters(regular_places.grid(3, 3)), 10),
+        'seven_rooms': (read_simulated_place(ROOT / 'config' / 'seven_rooms.yaml'), 16),
+        'patrol_world': (read_simulated_place(ROOT / 'config' / 'patrol_world.yaml'), 10),
+        'office, rooms alike': (read_simulated_place(ROOT / 'config' / 'office.yaml'), 10),
+        'grid, all rooms alike': (SimulatedPlace.from_parameters(regular_places.grid(3, 3)), 10),
     }
     rows = []
     for name, (world, count) in places.items():
@@ -372,7 +372,7 @@ def kidnaps(size: Size) -> None:
     )
 
 
-def kidnapped(world: World, seed: int, watched: float) -> tuple[float | None, float]:
+def kidnapped(world: SimulatedPlace, seed: int, watched: float) -> tuple[float | None, float]:
     """Carry a driving robot off; return when it knew its pose again, and how long it was wrong.
 
     Args:
@@ -778,7 +778,7 @@ def times(size: Size) -> None:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, place in places_to_patrol(Path(folder))[: size.of(None, 1, 1)]:
-            positions = read_world(place).plan.place.positions
+            positions = read_simulated_place(place).plan.place.positions
             learned = LegTimes()
             wrong, kept = [], 0
             legs = mission(place, seconds)

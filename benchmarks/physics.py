@@ -32,7 +32,7 @@ from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 ROOT = Path(__file__).resolve().parent.parent
 WRONG = 0.3
@@ -114,7 +114,7 @@ def main() -> int:
     rows = []
     for name, physics, noise in runs:
         robot = Robot(
-            read_world(file),
+            read_simulated_place(file),
             BaseModel(),
             LidarModel(noise=noise),
             rng=np.random.default_rng(options.seed),

@@ -58,7 +58,7 @@ from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.staging import Stage
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 PLACE = ROOT / 'config' / 'seven_rooms.yaml'
 POSE_ERROR = (0.02, math.radians(0.6))
@@ -98,7 +98,7 @@ DIM_LIGHTS = tuple(Conditions(light=light) for light in (0.3, 0.2, 0.15))
 class PlaceRooms:
     """Which place is where, on the map that the robot has."""
 
-    def __init__(self, world: World, grid: Any) -> None:
+    def __init__(self, world: SimulatedPlace, grid: Any) -> None:
         self._world = world
         rows, columns = np.indices(grid.cells.shape)
         middles = grid.centres_of(np.stack([rows.ravel(), columns.ravel()], axis=1))
@@ -134,7 +134,7 @@ class Rounds:
         verify_seconds: float = 0.0,
     ) -> None:
         self.rng = np.random.default_rng(seed)
-        world = read_world(PLACE)
+        world = read_simulated_place(PLACE)
         self.robot = Robot(world)
         self.world = world
         self.stage = Stage(self.robot)
@@ -680,7 +680,7 @@ class Marked:
 
     def __init__(self) -> None:
         self.rng = np.random.default_rng(41)
-        self.world = read_world(ROOT / 'config' / 'patrol_world.yaml')
+        self.world = read_simulated_place(ROOT / 'config' / 'patrol_world.yaml')
         self.stage = Stage(Robot(self.world))
         self.time = datetime(2026, 3, 2, tzinfo=UTC).timestamp()
 

@@ -39,7 +39,7 @@ from lidar_navigation.exploration.map_building import MapBuilder
 from lidar_navigation.geometry import Pose, Scan
 from lidar_navigation.localisation.localisation import Localiser
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 ROOT = Path(__file__).resolve().parents[1]
 Points = NDArray[np.float64]
@@ -199,7 +199,7 @@ def main() -> None:
 
 def write_log(file: Path) -> None:
     """Write what a robot on its way through the seven rooms sees, as CARMEN does."""
-    world, model = read_world(ROOT / 'config' / 'seven_rooms.yaml'), LidarModel(rays=180)
+    world, model = read_simulated_place(ROOT / 'config' / 'seven_rooms.yaml'), LidarModel(rays=180)
     rng, lines = np.random.default_rng(1), []
     x, y, yaw = world.plan.start
     for number in range(12):

@@ -25,7 +25,6 @@ DOUBLE_NAMES: dict[str, str] = {
     'ArmorClient': '',
     'Backlog': '',
     'Battery': '',
-    'Camera': '',
     'CameraView': '',
     'Edge': '',
     'Entry': '',
@@ -39,7 +38,6 @@ DOUBLE_NAMES: dict[str, str] = {
     'Motion': '',
     'Node': '',
     'OtherRobots': '',
-    'Panel': '',
     'Place': '',
     'Program': '',
     'Progress': '',
@@ -48,11 +46,9 @@ DOUBLE_NAMES: dict[str, str] = {
     'Sighting': '',
     'State': '',
     'Station': '',
-    'World': '',
     '_Body': '',
     '_Known': '',
     '_Waiting': '',
-    '_Way': '',
     '_Worker': '',
 }
 """Class names that several modules use, each with its reason to stay; empty: to be renamed."""

@@ -1,8 +1,8 @@
 """Simulated robot and place: camera, arm, base, lidar and time.
 
-    from surveillance_simulation import Robot, read_world
+    from surveillance_simulation import Robot, read_simulated_place
 
-    robot = Robot(read_world('config/seven_rooms.yaml'))
+    robot = Robot(read_simulated_place('config/seven_rooms.yaml'))
     robot.base.command(0.5, 0.0)  # m/s, rad/s
     robot.advance(0.1)  # seconds
     robot.scan()  # (360,) metres
@@ -19,8 +19,12 @@ from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel
+from surveillance_simulation.world.simulated_place import (
+    MarkerPanel,
+    SimulatedPlace,
+    read_simulated_place,
+)
 from surveillance_simulation.world.things import Thing
-from surveillance_simulation.world.world import Panel, World, read_world
 
 __all__ = [
     'Base',
@@ -28,12 +32,12 @@ __all__ = [
     'Camera',
     'Conditions',
     'LidarModel',
-    'Panel',
+    'MarkerPanel',
     'People',
     'PeopleModel',
     'Renderer',
     'Robot',
+    'SimulatedPlace',
     'Thing',
-    'World',
-    'read_world',
+    'read_simulated_place',
 ]

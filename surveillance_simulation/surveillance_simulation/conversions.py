@@ -27,7 +27,7 @@ from surveillance_runtime.conversions import (
 from surveillance_runtime.profile.description import FixedFrame
 from surveillance_simulation.camera.model import Camera, Picture
 from surveillance_simulation.robot.lidar import LidarModel
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 
 def time_to_ros(seconds: float) -> Time:
@@ -171,7 +171,7 @@ def camera_info_to_ros(camera: Camera, frame: str, stamp: Time) -> CameraInfo:
     )
 
 
-def doors_to_ros(world: World) -> DoorStates:
+def doors_to_ros(world: SimulatedPlace) -> DoorStates:
     """Convert the doors of a world to a message."""
     closed = world.closed_doors
     return DoorStates(

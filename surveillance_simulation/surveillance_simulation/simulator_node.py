@@ -65,7 +65,7 @@ from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.robot.robots import Robots
 from surveillance_simulation.staging import Happening, Stage, check_script, read_script
 from surveillance_simulation.world.people import People, PeopleModel
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 _UNDER_WAY = (
     GoalStatus.STATUS_ACCEPTED,
@@ -91,7 +91,7 @@ class Simulator(PatrolNode):
         rate = self.declare_fields(ClockRateModel())
         described = _place_parameters(self)
         try:
-            world = World.from_parameters(described)
+            world = SimulatedPlace.from_parameters(described)
             fleet = members_of(described, world.plan)
         except PlaceError as error:
             raise ParameterError(f'simulator: {error}') from None
@@ -160,7 +160,7 @@ class Simulator(PatrolNode):
         stamped = self.declare_fields(CommandSettings()).command_type == 'TwistStamped'
         try:
             self._bodies = [
-                _Body(
+                _RobotTopics(
                     self,
                     robot,
                     lockstep,
@@ -214,7 +214,7 @@ class Simulator(PatrolNode):
                 script = read_script(script_file)
             except FileError as error:
                 raise ParameterError(f'simulator: {error}') from None
-            if problem := check_script(Robot(World(self.robot.world.plan)), script):
+            if problem := check_script(Robot(SimulatedPlace(self.robot.world.plan)), script):
                 raise ParameterError(f'simulator: {script_file}: {problem}')
         truth: LineFile | None = None
 
@@ -319,7 +319,7 @@ class Simulator(PatrolNode):
         self._told_of_clock = others > 0
 
 
-class _Body:
+class _RobotTopics:
     """What the programs of one robot tell the simulator: commands, and where they are with them.
 
     Args:

@@ -16,7 +16,7 @@ import yaml
 from floor_plans import Grid
 from floor_plans.occupancy_grid import with_walls
 from lidar_navigation.geometry import Scan
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 
 class Operator:
@@ -126,6 +126,6 @@ def flat() -> Flat:
 
 
 @pytest.fixture
-def seven_rooms_world() -> World:
+def seven_rooms_world() -> SimulatedPlace:
     """Provide the seven rooms, as simulated."""
-    return read_world(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
+    return read_simulated_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')

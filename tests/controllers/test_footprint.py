@@ -115,10 +115,10 @@ def test_a_long_robot_drives_through_doors_of_a_foreign_physics_without_a_contac
     from surveillance_simulation.physics.model import PhysicsModel
     from surveillance_simulation.robot.base import BaseModel
     from surveillance_simulation.robot.robot import Robot
-    from surveillance_simulation.world.world import World
+    from surveillance_simulation.world.simulated_place import SimulatedPlace
 
     world = seven_rooms_world
-    assert isinstance(world, World)
+    assert isinstance(world, SimulatedPlace)
     physics = PhysicsModel(footprint=LONG, friction=0.5, sweep=0.0)
     robot = Robot(world, BaseModel(radius=BODY.circumscribed), physics=physics)
     grid = world.plan.grid()

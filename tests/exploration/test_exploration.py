@@ -21,10 +21,10 @@ from lidar_navigation.exploration.map_building import MapBuilder
 from lidar_navigation.geometry import Scan
 from lidar_navigation.planning.grid_planning import GridPlanner
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 
-def explored(world: World, *, most: float = 120.0, stop_at: float = math.inf) -> Any:
+def explored(world: SimulatedPlace, *, most: float = 120.0, stop_at: float = math.inf) -> Any:
     """Explore a place; return the exploration and the robot."""
     robot = Robot(world, rng=np.random.default_rng(0))
     exploration = Exploration(MapBuilder(start=robot.base.pose))
@@ -40,7 +40,7 @@ def explored(world: World, *, most: float = 120.0, stop_at: float = math.inf) ->
 
 
 def test_two_rooms_are_seen_whole_and_the_robot_comes_back() -> None:
-    world = World.from_parameters(regular_places.grid(2, 1))
+    world = SimulatedPlace.from_parameters(regular_places.grid(2, 1))
     exploration, robot = explored(world)
     assert exploration.phase is Phase.DONE
     assert exploration.reason == ''
@@ -55,7 +55,7 @@ def test_what_the_robot_does_not_fit_into_is_said() -> None:
     parameters = regular_places.grid(2, 1)
     (door,) = parameters['doors']
     parameters['doors'][door][3] = 0.5
-    exploration, robot = explored(World.from_parameters(parameters))
+    exploration, robot = explored(SimulatedPlace.from_parameters(parameters))
     assert exploration.phase is Phase.DONE
     assert math.dist(robot.base.pose[:2], exploration.builder.start[:2]) < 0.4
     assert exploration.unreached
@@ -63,13 +63,17 @@ def test_what_the_robot_does_not_fit_into_is_said() -> None:
 
 
 def test_what_was_seen_before_a_stop_is_there() -> None:
-    exploration, _ = explored(World.from_parameters(regular_places.grid(2, 1)), stop_at=1.0)
+    exploration, _ = explored(
+        SimulatedPlace.from_parameters(regular_places.grid(2, 1)), stop_at=1.0
+    )
     assert exploration.phase is Phase.DONE
     assert exploration.grid.free.any()
 
 
 def test_a_robot_that_is_held_goes_on_afterwards() -> None:
-    robot = Robot(World.from_parameters(regular_places.grid(2, 1)), rng=np.random.default_rng(0))
+    robot = Robot(
+        SimulatedPlace.from_parameters(regular_places.grid(2, 1)), rng=np.random.default_rng(0)
+    )
     exploration = Exploration(MapBuilder(start=robot.base.pose))
     held = 0
     while held < 90:

@@ -21,7 +21,7 @@ from surveillance_runtime.conversions import map_message, pose_estimate, pose_me
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.conversions import scan_to_ros
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 
 class Robot:
@@ -31,7 +31,7 @@ class Robot:
         parameters = regular_places.grid(2, 1)
         (name,) = parameters['doors']
         parameters['doors'][name][3] = door
-        world, model = World.from_parameters(parameters), LidarModel()
+        world, model = SimulatedPlace.from_parameters(parameters), LidarModel()
         self._ranges = scan(world, (2.0, 2.0, 0.0), model, np.random.default_rng(0))
         self._model = model
         self._scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)

@@ -15,23 +15,23 @@ from lidar_navigation.exploration.pose_graph import Edge, PoseGraph
 from lidar_navigation.exploration.scan_matching import Matcher, surface_of
 from lidar_navigation.geometry import Pose, Scan, composed, relative
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 LIDAR = LidarModel()
 
 
 @pytest.fixture(scope='module')
-def world() -> World:
-    return read_world('config/seven_rooms.yaml')
+def world() -> SimulatedPlace:
+    return read_simulated_place('config/seven_rooms.yaml')
 
 
-def seen(world: World, pose: Pose, seed: int = 0) -> Scan:
+def seen(world: SimulatedPlace, pose: Pose, seed: int = 0) -> Scan:
     ranges = scan(world, pose, LIDAR, np.random.default_rng(seed)).astype(float)
     return Scan(LIDAR.angles, ranges, LIDAR.range_max)
 
 
 @pytest.mark.parametrize('off', [(0.2, -0.15, 0.15), (-0.2, 0.2, -0.18), (0.0, 0.0, 0.0)])
-def test_a_scan_is_found_to_a_centimetre(world: World, off: Pose) -> None:
+def test_a_scan_is_found_to_a_centimetre(world: SimulatedPlace, off: Pose) -> None:
     before, true = (4.0, 11.0, 0.3), (4.3, 11.1, 0.45)
     matcher = Matcher(surface_of(seen(world, before)).moved(before))
     made = seen(world, true, seed=1)
@@ -56,7 +56,7 @@ def test_a_corridor_says_nothing_of_its_length() -> None:
     assert along < 1e-3 * across
 
 
-def test_the_two_sides_of_a_wall_are_not_taken_for_each_other(world: World) -> None:
+def test_the_two_sides_of_a_wall_are_not_taken_for_each_other(world: SimulatedPlace) -> None:
     # Between the corridors is a wall of 10 cm at y = 10.
     south, north = (9.0, 8.3, 0.0), (9.0, 12.0, 0.0)
     matcher = Matcher(surface_of(seen(world, south)).moved(south))
@@ -68,7 +68,7 @@ def test_the_two_sides_of_a_wall_are_not_taken_for_each_other(world: World) -> N
     assert abs(found.pose[1] - north[1]) < 0.05
 
 
-def test_a_scan_of_another_room_is_contradicted(world: World) -> None:
+def test_a_scan_of_another_room_is_contradicted(world: SimulatedPlace) -> None:
     matcher = Matcher(surface_of(seen(world, (10.0, 8.0, 0.0))).moved((10.0, 8.0, 0.0)))
     made = seen(world, (5.0, 10.0, 0.0))
     found = matcher.match(made, surface_of(made), (10.0, 8.0, 0.0), (1.0, 0.3))
@@ -121,7 +121,7 @@ def test_a_wrong_loop_among_right_ones_loses() -> None:
     assert max(off) < 0.5
 
 
-def test_a_scan_is_taken_away_as_if_it_had_never_been_there(world: World) -> None:
+def test_a_scan_is_taken_away_as_if_it_had_never_been_there(world: SimulatedPlace) -> None:
     one, two = (5.0, 10.0, 0.0), (10.0, 8.0, 1.0)
     grid, alone = EvidenceGrid(), EvidenceGrid()
     grid.add(one, seen(world, one))
@@ -142,7 +142,7 @@ def test_a_ray_of_unknown_length_shows_nothing() -> None:
     assert (grid.grid().cells < 0).all()
 
 
-def test_what_walked_away_leaves_the_map(world: World) -> None:
+def test_what_walked_away_leaves_the_map(world: SimulatedPlace) -> None:
     pose = (5.0, 10.0, 0.0)
     empty = seen(world, pose)
     near = empty.ranges.copy()
@@ -156,7 +156,7 @@ def test_what_walked_away_leaves_the_map(world: World) -> None:
     assert grid.grid().free[grid.grid().cell_of(6.5, 10.0)]
 
 
-def test_a_round_is_mapped_in_spite_of_a_bad_odometry(world: World) -> None:
+def test_a_round_is_mapped_in_spite_of_a_bad_odometry(world: SimulatedPlace) -> None:
     rng = np.random.default_rng(2)
     stops = [(5.0, 10.0), (6.0, 8.5), (12.5, 8.5), (12.5, 12.0), (6.0, 11.5), (5.0, 10.0)]
     points = [np.array(stops[0])]
@@ -178,7 +178,7 @@ def test_a_round_is_mapped_in_spite_of_a_bad_odometry(world: World) -> None:
     assert builder.loops > 0
 
 
-def test_odometry_that_begins_anew_does_not_tear_the_map(world: World) -> None:
+def test_odometry_that_begins_anew_does_not_tear_the_map(world: SimulatedPlace) -> None:
     builder, pose = MapBuilder(start=(4.0, 11.0, 0.3)), (4.0, 11.0, 0.3)
     builder.see(seen(world, pose), (3e6, -7.0, 0.0))
     before = builder.grid().cells.shape

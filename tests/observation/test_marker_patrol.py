@@ -36,7 +36,7 @@ from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.staging import Stage
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 from .marked_walls import camera_pose
 
@@ -56,7 +56,7 @@ class Patrol:
 
     def __init__(self, stay: float) -> None:
         self.rng = np.random.default_rng(5)
-        world = read_world(PLACE)
+        world = read_simulated_place(PLACE)
         self.stage, plan = Stage(Robot(world)), world.plan
         world.hang_marker(Marker('m21', 21, -3.93, -1.5, 1.0, 0.0, SIDE))
         grid, self.points = plan.grid(0.05), plan.place.positions

@@ -16,7 +16,7 @@ from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world.figures import person
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 SEVEN_ROOMS = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
 DATA = Path(skimage.__file__).parent / 'data'
@@ -108,7 +108,7 @@ def test_the_simulators_person_looks_like_one_to_a_network_that_knows_photograph
         pytest.importorskip('mujoco')
     seen = []
     for degrees in (0, 90, 225):
-        world = read_world(SEVEN_ROOMS)
+        world = read_simulated_place(SEVEN_ROOMS)
         world.put(person('p', 13.0, 8.0, math.radians(degrees)))
         drawn = renderer(world, Camera.from_field_of_view())
         picture = expose(

@@ -15,7 +15,7 @@ from PIL import Image
 from floor_plans.drawing import Canvas, blend, draw_place
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import map_command
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 pytestmark = pytest.mark.early
 
@@ -88,7 +88,7 @@ def test_a_run_is_drawn_with_its_waits(
     assert map_command.main([str(place), '--record', str(tmp_path), '-o', str(output)]) == 0
     line = f'{tmp_path}: 1 min 0 s of patrol · 2 visits · 8 m driven · 0 recharges · 2 failures'
     assert line in capsys.readouterr().out
-    plain = draw_place(read_world(place).plan, 'x', 'y')
+    plain = draw_place(read_simulated_place(place).plan, 'x', 'y')
     with Image.open(output) as picture:
         assert picture.size[0] > plain.size[0]
 
@@ -128,7 +128,7 @@ def test_the_names_of_places_end_before_their_bars(
 def test_ways_and_failures_come_from_the_record(record: Path) -> None:
     from surveillance_runtime import event_log
 
-    place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
+    place = read_simulated_place(CONFIG / 'seven_rooms.yaml').plan.place
     run = map_command.run_of(event_log.read(record), place, 'run')
     assert run.planned == [
         [(5.0, 10.0), (10.0, 8.0)],
@@ -150,7 +150,7 @@ def test_a_room_that_was_added_during_the_run_keeps_nothing_from_being_drawn(
 ) -> None:
     from surveillance_runtime import event_log
 
-    place = read_world(CONFIG / 'seven_rooms.yaml').plan.place
+    place = read_simulated_place(CONFIG / 'seven_rooms.yaml').plan.place
     with MissionRecord(record) as mission:
         mission.write('map', 61.0, places=[*place.rooms, 'New'])
         way = [[5, 10], [4, 10], [3, 10]]

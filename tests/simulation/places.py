@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from surveillance_simulation.camera.model import Array
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
@@ -45,9 +45,9 @@ def changed(**sections: Any) -> dict[str, Any]:
     return parameters
 
 
-def two_rooms() -> World:
+def two_rooms() -> SimulatedPlace:
     """Return the two rooms as a world."""
-    return World.from_parameters(TWO_ROOMS)
+    return SimulatedPlace.from_parameters(TWO_ROOMS)
 
 
 def camera_pose(

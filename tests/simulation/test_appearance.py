@@ -18,9 +18,9 @@ from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.camera.scene import Face, faces_of, thing_faces
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.figures import person
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 from surveillance_simulation.world.textures import Texture
 from surveillance_simulation.world.things import Shape, barrel, box, chair
-from surveillance_simulation.world.world import World
 
 from .places import camera_pose, changed, two_rooms
 
@@ -274,7 +274,7 @@ OPEN = {
 
 
 def test_a_place_is_seen_from_within_with_its_doors_as_they_are() -> None:
-    world = World.from_parameters(changed(markers={'m1': [1.0, 0.06, 1.0, 1.0, 0.0]}))
+    world = SimulatedPlace.from_parameters(changed(markers={'m1': [1.0, 0.06, 1.0, 1.0, 0.0]}))
     assert seen_faces(faces_of(world)) == {
         key: pytest.approx(each, abs=1e-6) for key, each in {**WALLS, **OPEN}.items()
     }
@@ -417,7 +417,7 @@ def test_the_parts_of_a_thing_are_closed_and_lit_from_one_side() -> None:
 
 
 def test_where_a_box_a_panel_and_a_station_lie() -> None:
-    world = World.from_parameters(
+    world = SimulatedPlace.from_parameters(
         changed(markers={'m1': [7.0, 5.94, 1.3, 1.1, math.pi]}, station=[1.0, 1.2, math.pi / 2])
     )
     (panel,) = (each for each in faces_of(world) if each.texture.shape == (240, 240, 3))

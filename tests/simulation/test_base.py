@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_simulation.robot.base import PUSH_GAP, Base, BaseModel
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 from .places import CONFIG, two_rooms
 
@@ -137,8 +137,8 @@ def test_a_command_that_is_no_number_stops_it() -> None:
 
 
 @pytest.fixture(scope='module')
-def seven_rooms() -> World:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
+def seven_rooms() -> SimulatedPlace:
+    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
     world.set_door('D7', False)
     world.place_obstacle('box', 6.0, 9.0, 0.3)
     return world
@@ -149,7 +149,7 @@ def seven_rooms() -> World:
     st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-1.5, 1.5), st.integers(1, 60)), max_size=12)
 )
 def test_no_commands_ever_drive_it_into_something(
-    seven_rooms: World, commands: list[tuple[float, float, int]]
+    seven_rooms: SimulatedPlace, commands: list[tuple[float, float, int]]
 ) -> None:
     base = Base(seven_rooms, seven_rooms.plan.start)
     for speed, turn_speed, steps in commands:

@@ -16,7 +16,7 @@ from lidar_navigation.geometry import Scan
 from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import PeopleModel
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 from .places import CONFIG
 
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.early
 
 RADIUS = 0.22
 DOORS = ('D1', 'D2', 'D3', 'D4', 'D5', 'D6', 'D7')
-PLAN = read_world(CONFIG / 'seven_rooms.yaml').plan
+PLAN = read_simulated_place(CONFIG / 'seven_rooms.yaml').plan
 points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
 
 
@@ -46,7 +46,7 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
     goal: tuple[float, float],
     closed: set[str],
 ) -> None:
-    world = World(PLAN)
+    world = SimulatedPlace(PLAN)
     for door in closed:
         world.set_door(door, False)
     planner.set_closed(
@@ -61,7 +61,7 @@ def test_a_path_never_touches_a_wall_or_a_closed_door(
         assert world.is_free(float(x), float(y), RADIUS)
 
 
-def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
+def driven(world: SimulatedPlace, seed: int, goals: list[str]) -> tuple[Robot, float]:
     """Drive through places on cores alone; return the robot and how far it left its paths."""
     robot = Robot(world, rng=np.random.default_rng(seed))
     drawn = world.plan.grid()
@@ -91,7 +91,7 @@ def driven(world: World, seed: int, goals: list[str]) -> tuple[Robot, float]:
 
 @pytest.mark.parametrize('seed', [1, 2, 3])
 def test_a_drive_stays_in_the_corridor_around_its_path_and_arrives(seed: int) -> None:
-    world = World(PLAN)
+    world = SimulatedPlace(PLAN)
     goals = [['R1', 'R4', 'E'], ['R3', 'C1', 'R2'], ['C2', 'E', 'R1']][seed - 1]
     robot, furthest = driven(world, seed, goals)
     assert robot.base.collisions == 0

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 from .places import CONFIG, two_rooms
 
 EXACT = LidarModel(noise=0.0)
 
 
-def ahead(world: World, x: float, y: float, yaw: float) -> float:
+def ahead(world: SimulatedPlace, x: float, y: float, yaw: float) -> float:
     return float(scan(world, (x, y, yaw), EXACT)[EXACT.rays // 2])
 
 
@@ -57,8 +57,8 @@ def test_noise_is_repeatable_and_of_the_size_given() -> None:
 
 
 @pytest.fixture(scope='module')
-def furnished() -> World:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
+def furnished() -> SimulatedPlace:
+    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
     world.set_door('D5', False)
     world.place_obstacle('box', 10.0, 9.0, 0.3)
     return world
@@ -67,7 +67,7 @@ def furnished() -> World:
 @settings(max_examples=40)
 @given(x=st.floats(7.3, 17.7), y=st.floats(6.8, 9.7), angle=st.integers(0, 359))
 def test_a_ray_ends_where_walking_along_it_meets_something(
-    furnished: World, x: float, y: float, angle: int
+    furnished: SimulatedPlace, x: float, y: float, angle: int
 ) -> None:
     if furnished.clearance(x, y) < EXACT.range_min:
         return

@@ -13,7 +13,7 @@ from strict_files.yaml_file import read_yaml_file
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.people import People, PeopleModel
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 from .places import CONFIG
 
@@ -21,18 +21,20 @@ CELL = 0.05
 
 
 @pytest.fixture(scope='module')
-def worlds(tmp_path_factory: pytest.TempPathFactory) -> tuple[World, World]:
+def worlds(tmp_path_factory: pytest.TempPathFactory) -> tuple[SimulatedPlace, SimulatedPlace]:
     """Return the seven rooms by their walls, and by a map that was drawn of them."""
     folder = tmp_path_factory.mktemp('map')
-    by_walls = read_world(CONFIG / 'seven_rooms.yaml')
+    by_walls = read_simulated_place(CONFIG / 'seven_rooms.yaml')
     grid = by_walls.plan.grid(CELL)
     write_map(folder / 'rooms.yaml', grid.cells[::-1], CELL, (*grid.origin, 0.0))
     given = dict(read_yaml_file(CONFIG / 'seven_rooms.yaml').values['/**']['ros__parameters'])
     del given['walls']
-    return by_walls, World.from_parameters({**given, 'map_file': str(folder / 'rooms.yaml')})
+    return by_walls, SimulatedPlace.from_parameters(
+        {**given, 'map_file': str(folder / 'rooms.yaml')}
+    )
 
 
-def test_rays_end_where_the_walls_are(worlds: tuple[World, World]) -> None:
+def test_rays_end_where_the_walls_are(worlds: tuple[SimulatedPlace, SimulatedPlace]) -> None:
     by_walls, by_map = worlds
     model = LidarModel(noise=0.0)
     for x, y, _ in by_walls.plan.place.positions.values():
@@ -45,7 +47,7 @@ def test_rays_end_where_the_walls_are(worlds: tuple[World, World]) -> None:
         assert np.mean(gap < 0.1) > 0.97
 
 
-def test_clearance_is_that_of_the_cells(worlds: tuple[World, World]) -> None:
+def test_clearance_is_that_of_the_cells(worlds: tuple[SimulatedPlace, SimulatedPlace]) -> None:
     by_walls, by_map = worlds
     rng = np.random.default_rng(4)
     west, south, east, north = by_walls.plan.bounds
@@ -54,7 +56,7 @@ def test_clearance_is_that_of_the_cells(worlds: tuple[World, World]) -> None:
     assert max(map(abs, gaps)) < 1.5 * CELL
 
 
-def test_the_robot_stops_at_the_map(worlds: tuple[World, World]) -> None:
+def test_the_robot_stops_at_the_map(worlds: tuple[SimulatedPlace, SimulatedPlace]) -> None:
     _, by_map = worlds
     x, y, _ = by_map.plan.place.positions['R1']
     base = Base(by_map, (x, y, math.pi / 2), BaseModel())
@@ -65,7 +67,7 @@ def test_the_robot_stops_at_the_map(worlds: tuple[World, World]) -> None:
     assert by_map.clearance(*base.pose[:2]) == pytest.approx(base.model.radius, abs=0.01)
 
 
-def test_a_door_of_a_map_can_be_closed(worlds: tuple[World, World]) -> None:
+def test_a_door_of_a_map_can_be_closed(worlds: tuple[SimulatedPlace, SimulatedPlace]) -> None:
     _, by_map = worlds
     door = by_map.plan.doors['D1']
     assert by_map.is_free(door.x, door.y, 0.3)
@@ -74,7 +76,7 @@ def test_a_door_of_a_map_can_be_closed(worlds: tuple[World, World]) -> None:
     by_map.set_door('D1', True)
 
 
-def test_rooms_are_the_same(worlds: tuple[World, World]) -> None:
+def test_rooms_are_the_same(worlds: tuple[SimulatedPlace, SimulatedPlace]) -> None:
     by_walls, by_map = worlds
     rng = np.random.default_rng(5)
     for room, (x, y, _) in by_walls.plan.place.positions.items():
@@ -82,7 +84,7 @@ def test_rooms_are_the_same(worlds: tuple[World, World]) -> None:
             assert by_map.place_at(x + dx, y + dy) == room
 
 
-def test_people_walk_in_a_map(worlds: tuple[World, World]) -> None:
+def test_people_walk_in_a_map(worlds: tuple[SimulatedPlace, SimulatedPlace]) -> None:
     _, by_map = worlds
     rng = np.random.default_rng(6)
     people = People(by_map.plan, PeopleModel(count=3), rng)
@@ -94,11 +96,13 @@ def test_people_walk_in_a_map(worlds: tuple[World, World]) -> None:
         assert by_map.clearance(x, y) > radius - CELL
 
 
-def test_a_place_without_walls_and_map_is_an_open_floor(worlds: tuple[World, World]) -> None:
+def test_a_place_without_walls_and_map_is_an_open_floor(
+    worlds: tuple[SimulatedPlace, SimulatedPlace],
+) -> None:
     by_walls, _ = worlds
     given = dict(read_yaml_file(CONFIG / 'seven_rooms.yaml').values['/**']['ros__parameters'])
     del given['walls']
-    world = World.from_parameters(given)
+    world = SimulatedPlace.from_parameters(given)
     assert world.is_free(*by_walls.plan.start[:2], 0.5)
     assert np.isinf(scan(world, by_walls.plan.start, LidarModel(noise=0.0))).all()
     assert shapes.distances(world.solid, 0.0, 0.0).shape == (0,)

@@ -12,7 +12,7 @@ from surveillance_simulation.camera import mujoco_rendering
 from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
-from surveillance_simulation.world.world import read_world
+from surveillance_simulation.world.simulated_place import read_simulated_place
 
 from .places import CONFIG, camera_pose, two_rooms
 
@@ -28,7 +28,7 @@ def corners_in(picture: np.ndarray) -> dict[int, np.ndarray]:
 
 def test_both_renderers_show_the_same_markers_at_the_same_pixels() -> None:
     pytest.importorskip('mujoco')
-    world = read_world(CONFIG / 'patrol_world.yaml')
+    world = read_simulated_place(CONFIG / 'patrol_world.yaml')
     camera = Camera.from_field_of_view()
     renderer, other = MujocoRenderer(world, camera), Renderer(world, camera)
     rng = np.random.default_rng(0)

@@ -10,19 +10,19 @@ from scipy.sparse.csgraph import dijkstra
 
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel, _Ways
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 from .places import CONFIG, two_rooms
 
 FAR_AWAY = (100.0, 100.0)
 
 
-def people_in(world: World, seed: int = 1, **model: object) -> People:
+def people_in(world: SimulatedPlace, seed: int = 1, **model: object) -> People:
     return People(world.plan, PeopleModel(**model), np.random.default_rng(seed))  # type: ignore[arg-type]
 
 
 def test_they_walk_from_room_to_room_and_through_no_wall() -> None:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
+    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
     people = people_in(world, count=3)
     before, entered, walked = people.discs, set(), 0.0
     for _ in range(2400):
@@ -70,7 +70,7 @@ def test_the_same_seed_gives_the_same_people() -> None:
     assert (first.discs == second.discs).all()
 
 
-def straight_costs(world: World, reach: float) -> tuple[np.ndarray, np.ndarray]:
+def straight_costs(world: SimulatedPlace, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Return which cells of .1 m people may be in, and the cost of each: the plain way."""
     rows, columns = 20, 60
     free, cost = np.zeros((rows, columns), bool), np.full((rows, columns), np.inf)

@@ -13,7 +13,7 @@ from surveillance_simulation.physics import base as physics_base
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 from .places import changed, two_rooms
 
@@ -22,7 +22,7 @@ pytest.importorskip('mujoco')
 QUIET = LidarModel(noise=0.0)
 
 
-def robot_in(world: World | None = None, **physics: object) -> Robot:
+def robot_in(world: SimulatedPlace | None = None, **physics: object) -> Robot:
     return Robot(world or two_rooms(), lidar=QUIET, physics=PhysicsModel(**physics))  # type: ignore[arg-type]
 
 
@@ -119,7 +119,7 @@ def test_a_long_robot_passes_a_gap_that_it_fits_and_a_wide_one_does_not() -> Non
         ((0.4, 0.15, -0.4, 0.15, -0.4, -0.15, 0.4, -0.15), True),
         ((0.15, 0.4, -0.15, 0.4, -0.15, -0.4, 0.15, -0.4), False),
     ):
-        world = World.from_parameters(changed())
+        world = SimulatedPlace.from_parameters(changed())
         for name, y in (('north', 1.6), ('south', 0.4)):
             world.place_obstacle(name, 2.0, y, 0.3)
         robot = robot_in(world, footprint=footprint)

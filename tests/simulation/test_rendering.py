@@ -16,8 +16,8 @@ from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.camera.scene import thing_faces
 from surveillance_simulation.world import textures
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 from surveillance_simulation.world.things import barrel, box
-from surveillance_simulation.world.world import World, read_world
 
 from .places import CONFIG, camera_pose, changed, two_rooms
 
@@ -32,12 +32,12 @@ def ids_in(picture: np.ndarray) -> set[int]:
     return set() if found is None else {int(each) for each in np.ravel(found)}
 
 
-def look(world: World, *pose: float, conditions: Conditions = CLEAN) -> np.ndarray:
+def look(world: SimulatedPlace, *pose: float, conditions: Conditions = CLEAN) -> np.ndarray:
     ideal = Renderer(world, CAMERA).ideal(camera_pose(*pose))
     return expose(ideal, conditions, np.random.default_rng(0))
 
 
-def facing_west(distance: float = 1.5) -> tuple[World, tuple[float, ...]]:
+def facing_west(distance: float = 1.5) -> tuple[SimulatedPlace, tuple[float, ...]]:
     """Return the two rooms with marker 7 on the western wall, and a camera in front of it."""
     world = two_rooms()
     world.hang_marker(Marker('m1', 7, 0.06, 1.0, 1.0, 0.0, 0.2))
@@ -45,7 +45,7 @@ def facing_west(distance: float = 1.5) -> tuple[World, tuple[float, ...]]:
 
 
 def test_every_marker_of_the_patrol_world_can_be_read_from_the_start() -> None:
-    world = read_world(CONFIG / 'patrol_world.yaml')
+    world = read_simulated_place(CONFIG / 'patrol_world.yaml')
     renderer = Renderer(world, CAMERA)
     x, y, _ = world.plan.start
     seen = set()
@@ -246,7 +246,7 @@ def test_dark_walls_leave_the_panels_white() -> None:
 
 
 def test_two_panels_with_one_id_can_be_staged_and_are_found_as_such() -> None:
-    world = World.from_parameters(
+    world = SimulatedPlace.from_parameters(
         changed(markers={'m1': [7, 0.06, 0.5, 1.0, 0.0], 'm2': [7, 0.06, 1.5, 1.0, 0.0]})
     )
     renderer, fused = Renderer(world, CAMERA), FusedPositions()

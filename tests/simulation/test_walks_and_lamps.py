@@ -11,15 +11,15 @@ from floor_plans import PlaceError
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.robot.robot import Robot
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 from surveillance_simulation.world.walks import Walks
-from surveillance_simulation.world.world import World
 
 from .places import TWO_ROOMS, two_rooms
 
 NOBODY: list[tuple[float, float]] = []
 
 
-def spot(world: World) -> tuple[float, float, int]:
+def spot(world: SimulatedPlace) -> tuple[float, float, int]:
     """Return where the only person is, and where they look, degrees."""
     (person,) = world.people
     return round(person.x, 3), round(person.y, 3), round(math.degrees(person.yaw)) % 360
@@ -120,7 +120,7 @@ def seen_light(light: LampLight, x: float, y: float) -> np.ndarray:
 
 
 def test_each_place_has_the_light_of_its_own_lamp() -> None:
-    world = World.from_parameters(TWO_ROOMS)
+    world = SimulatedPlace.from_parameters(TWO_ROOMS)
     assert LampLight.of(world, None) is None
     world.set_lamp('A', 0.3)
     world.set_door('D', is_open=False)
@@ -138,7 +138,7 @@ def test_each_place_has_the_light_of_its_own_lamp() -> None:
 
 
 def test_through_an_open_door_light_comes_as_far_as_a_metre() -> None:
-    world = World.from_parameters(TWO_ROOMS)
+    world = SimulatedPlace.from_parameters(TWO_ROOMS)
     world.set_lamp('A', 0.2)
     world.set_door('D', is_open=False)
     closed = LampLight.of(world, None)

@@ -25,7 +25,7 @@ _FIRST_LOOK = 2.0
 """Deadlines of real time that the first look all around takes at most."""
 
 
-class Camera(Protocol):
+class ScanCamera(Protocol):
     """What turns the camera. Each blocks until the camera has rested and its pictures were seen."""
 
     def pose(self, number: int) -> None:
@@ -73,7 +73,7 @@ class InitialScan:
 
     def run(
         self,
-        camera: Camera,
+        camera: ScanCamera,
         judge: Callable[[], SurveyReport],
         now: Callable[[], float],
         say: Callable[[str], None],

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from floor_plans.shapes import WALL_HEIGHT
 from surveillance_simulation.camera.model import Array, Camera, Scene
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 BESIDE_WALL = 0.15
 """What lights a surface is looked up so far before it, metres: half a wall and a cell."""
@@ -25,7 +25,7 @@ _REACH = 1.0
 class LampLight:
     """The light of a world whose lamps are not all as by day."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: SimulatedPlace) -> None:
         self.lamps = dict(world.lamps)
         self.doors = world.closed_doors
         self._grid = world.regions.grid
@@ -36,7 +36,7 @@ class LampLight:
         self._light = _spread(world, light)
 
     @classmethod
-    def of(cls, world: World, before: LampLight | None) -> LampLight | None:
+    def of(cls, world: SimulatedPlace, before: LampLight | None) -> LampLight | None:
         """Return the light of a world, the one from before where it still holds; None: all by day.
 
         Args:
@@ -93,7 +93,7 @@ class LampLight:
         return np.asarray(picture * np.maximum(light, STRAY)[..., None], np.float32)
 
 
-def _spread(world: World, light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def _spread(world: SimulatedPlace, light: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Return the light of each cell, with what comes in from where it is brighter."""
     grid = world.regions.grid
     free = grid.free.copy()

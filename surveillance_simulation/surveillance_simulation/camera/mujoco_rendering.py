@@ -21,9 +21,13 @@ from surveillance_simulation.camera.scene import DOOR_HEIGHT, STATION_SIDE
 from surveillance_simulation.mujoco_bodies import about_z, add_thing
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.world import textures
+from surveillance_simulation.world.simulated_place import (
+    LEAF_THICKNESS,
+    MarkerPanel,
+    SimulatedPlace,
+)
 from surveillance_simulation.world.textures import Texture
 from surveillance_simulation.world.things import Part, Thing
-from surveillance_simulation.world.world import LEAF_THICKNESS, Panel, World
 
 _PANEL_THICKNESS = 0.004
 _FURTHEST = 500.0
@@ -33,7 +37,7 @@ _FURTHEST = 500.0
 class MujocoRenderer:
     """Takes pictures of one world with one camera. All pictures must be taken in one thread."""
 
-    def __init__(self, world: World, camera: Camera, robot: str = '') -> None:
+    def __init__(self, world: SimulatedPlace, camera: Camera, robot: str = '') -> None:
         """Prepare pictures.
 
         Args:
@@ -104,7 +108,7 @@ class MujocoRenderer:
         return self._lamps.shine(picture, nearness.astype(np.float32), self._camera, camera_pose)
 
 
-def _model(world: World, camera: Camera, movers: Sequence[Thing]) -> Any:
+def _model(world: SimulatedPlace, camera: Camera, movers: Sequence[Thing]) -> Any:
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth, spec.visual.global_.offheight = camera.width, camera.height
     spec.visual.headlight.ambient = [0.6, 0.6, 0.6]
@@ -195,7 +199,7 @@ def _box(
     _add_box(spec, centre, math.atan2(sin, cos), size, material)
 
 
-def _door(spec: Any, door: Door, world: World) -> None:
+def _door(spec: Any, door: Door, world: SimulatedPlace) -> None:
     _box(spec, *door.ends, DOOR_HEIGHT, WALL_HEIGHT, 'plaster')
     if (leaf := world.leaf(door.name)) is not None:
         thickness = LEAF_THICKNESS if world.door_angle(door.name) else WALL_THICKNESS
@@ -206,7 +210,7 @@ def _painted(part: Part) -> dict[str, Any]:
     return {'rgba': [*(each / 255 for each in part.colour), 1.0]}
 
 
-def _panel(spec: Any, name: str, panel: Panel, dictionary: str) -> None:
+def _panel(spec: Any, name: str, panel: MarkerPanel, dictionary: str) -> None:
     marker = panel.marker
     picture = textures.marker_panel(dictionary, marker.id, panel.state)
     _material(spec, f'marker {name}', picture, mujoco.mjtTexture.mjTEXTURE_CUBE)

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera, Picture
 from surveillance_simulation.camera.scene import Face, faces_of, thing_faces
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 from surveillance_simulation.world.textures import Texture
-from surveillance_simulation.world.world import World
 
 _NEAR = 0.03
 """What is nearer to the lens than this is not seen, metres."""
@@ -28,7 +28,7 @@ _CEILING = (196.0, 198.0, 200.0)
 class Renderer:
     """Takes pictures of one world with one camera, keeping what does not change between them."""
 
-    def __init__(self, world: World, camera: Camera, robot: str = '') -> None:
+    def __init__(self, world: SimulatedPlace, camera: Camera, robot: str = '') -> None:
         """Prepare pictures.
 
         Args:

@@ -13,9 +13,13 @@ from floor_plans import Door, shapes
 from floor_plans.shapes import WALL_HEIGHT, WALL_THICKNESS
 from surveillance_simulation.camera.model import Array
 from surveillance_simulation.world import textures
+from surveillance_simulation.world.simulated_place import (
+    LEAF_THICKNESS,
+    MarkerPanel,
+    SimulatedPlace,
+)
 from surveillance_simulation.world.textures import TILE, Texture
 from surveillance_simulation.world.things import Part, Shape, Thing
-from surveillance_simulation.world.world import LEAF_THICKNESS, Panel, World
 
 DOOR_HEIGHT = 2.05
 STATION_SIDE = 0.6
@@ -47,7 +51,7 @@ class Face:
         return self.corner + (self.across + self.down) / 2
 
 
-def faces_of(world: World) -> list[Face]:
+def faces_of(world: SimulatedPlace) -> list[Face]:
     """Return every face of a world, but for its people.
 
     Raises:
@@ -200,7 +204,7 @@ def _outline(part: Part, x: float, y: float, yaw: float) -> list[tuple[float, fl
     return [(x + cosine * a - sine * b, y + sine * a + cosine * b) for a, b in points]
 
 
-def _panel(panel: Panel, dictionary: str) -> Face:
+def _panel(panel: MarkerPanel, dictionary: str) -> Face:
     marker = panel.marker
     texture = textures.marker_panel(dictionary, marker.id, panel.state)
     side = marker.size * textures.panel_share(dictionary)

@@ -28,7 +28,7 @@ from surveillance_runtime.state_topics import OwnedTopic
 from surveillance_simulation import conversions
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -128,7 +128,7 @@ class PlaceFeed:
     """The topics of simulated time, of the map and of the doors: one of each for all robots."""
 
     def __init__(
-        self, node: PatrolNode, world: World, setup: SensorSetup, *, drives_clock: bool
+        self, node: PatrolNode, world: SimulatedPlace, setup: SensorSetup, *, drives_clock: bool
     ) -> None:
         """Create the topics on a node; publish the map and the doors' states."""
         self._world = world

@@ -33,7 +33,7 @@ from surveillance_simulation.robot.base import (
     moved,
     wrapped,
 )
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 Floats = npt.NDArray[np.float64]
 _STIFFNESS, _DAMPING = 60.0, 0.6
@@ -63,7 +63,7 @@ class PhysicsBase:
 
     def __init__(
         self,
-        world: World,
+        world: SimulatedPlace,
         pose: Pose,
         model: BaseModel | None = None,
         physics: PhysicsModel | None = None,

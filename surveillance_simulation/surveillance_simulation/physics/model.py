@@ -19,7 +19,7 @@ from lidar_navigation.robot_base import robot_footprint
 from strict_files.settings import parameter
 from surveillance_simulation.mujoco_bodies import about_z, add_thing
 from surveillance_simulation.optional_mujoco import mujoco
-from surveillance_simulation.world.world import LEAF_THICKNESS, World
+from surveillance_simulation.world.simulated_place import LEAF_THICKNESS, SimulatedPlace
 
 STEP = 0.002
 """Step of the physics, seconds."""
@@ -87,7 +87,7 @@ def require_mujoco() -> None:
         raise ImportError("'mujoco': expected the package mujoco (pip install mujoco)")
 
 
-def compiled(world: World, radius: float, robot: PhysicsModel, people: int) -> Any:
+def compiled(world: SimulatedPlace, radius: float, robot: PhysicsModel, people: int) -> Any:
     """Return the model of a world as it is now, with a robot that stands at the origin.
 
     The robot's free joint comes first in its coordinates, then the left wheel and the right one.

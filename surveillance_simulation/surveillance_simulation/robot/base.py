@@ -16,7 +16,7 @@ import numpy as np
 from floor_plans.shapes import Pose
 from lidar_navigation.robot_base import robot_deceleration, robot_radius
 from strict_files.settings import parameter
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 _CONTACT = 1e-3
 """Gap that remains between the robot and what it ran into, metres."""
@@ -90,7 +90,7 @@ class Base:
 
     def __init__(
         self,
-        world: World,
+        world: SimulatedPlace,
         pose: Pose,
         model: BaseModel | None = None,
         rng: np.random.Generator | None = None,

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from floor_plans import shapes
 from floor_plans.shapes import Pose
 from strict_files.settings import parameter
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 _PARALLEL = 1e-12
 
@@ -60,7 +60,7 @@ class Sweep:
 
 
 def scan(
-    world: World,
+    world: SimulatedPlace,
     pose: Pose,
     model: LidarModel,
     rng: np.random.Generator | None = None,

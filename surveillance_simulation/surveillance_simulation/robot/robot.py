@@ -17,8 +17,8 @@ from surveillance_simulation.robot.arm_motion import ArmMotion
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, Sweep, scan
 from surveillance_simulation.world.people import People
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 from surveillance_simulation.world.walks import Walks
-from surveillance_simulation.world.world import World
 
 PHYSICS_STEP = 0.05
 _STATE = ('x', 'y', 'yaw', 'odometry_x', 'odometry_y', 'odometry_yaw', 'time')
@@ -40,7 +40,7 @@ class Robot:
 
     def __init__(
         self,
-        world: World,
+        world: SimulatedPlace,
         base_model: BaseModel | None = None,
         lidar: LidarModel | None = None,
         arm: Arm = ARM,

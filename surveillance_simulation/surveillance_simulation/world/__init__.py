@@ -1,5 +1,5 @@
 """The simulated place.
 
-- `world`: walls, doors, obstacles and markers as they are now (`World`, `read_world`);
+- `simulated_place`: walls, doors, obstacles and markers as they are now (`SimulatedPlace`);
 - `people`: people who walk in it; `textures`: what surfaces look like.
 """

@@ -154,7 +154,7 @@ class _Person:
 
 
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Route:
     """The shortest way to a room from everywhere.
 
     Attributes:
@@ -186,7 +186,7 @@ class _Ways:
         # Walking near a wall is up to three times as dear, so that the middle is preferred.
         crowded = np.clip(1.0 - (clearance - reach) / 0.5, 0.0, 1.0)
         self._cost = np.where(self._free, 1.0 + 2.0 * crowded, -1.0)
-        self._to_goal: dict[str, _Way] = {}
+        self._to_goal: dict[str, _Route] = {}
 
     def point(self, goal: str) -> Point:
         """Return the point of a room, metres."""
@@ -212,12 +212,12 @@ class _Ways:
             x, y = self._points[goal]
         return math.atan2(y - at[1], x - at[0])
 
-    def _to(self, goal: str) -> _Way:
+    def _to(self, goal: str) -> _Route:
         if goal not in self._to_goal:
             self._to_goal[goal] = self._way_to(self._points[goal])
         return self._to_goal[goal]
 
-    def _way_to(self, goal: Point) -> _Way:
+    def _way_to(self, goal: Point) -> _Route:
         from skimage.graph import MCP_Geometric  # takes its time, and most runs have no people
 
         left, _ = MCP_Geometric(self._cost).find_costs([self._grid.cell_of(*goal)])
@@ -237,4 +237,4 @@ class _Ways:
                 ahead[to][nearer] = cells[of][nearer]
         one = ahead.ravel()
         two = one[one]
-        return _Way(left.astype(np.float32), one[two[two]])
+        return _Route(left.astype(np.float32), one[two[two]])

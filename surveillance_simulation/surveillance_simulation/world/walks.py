@@ -12,7 +12,7 @@ import numpy as np
 from floor_plans import PlaceError
 from floor_plans.shapes import Point
 from surveillance_simulation.world.figures import person
-from surveillance_simulation.world.world import World
+from surveillance_simulation.world.simulated_place import SimulatedPlace
 
 SPEED = 1.0
 """How fast they walk, m/s."""
@@ -45,7 +45,7 @@ class _Walk:
 class Walks:
     """The people of a world who walk a given way."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: SimulatedPlace) -> None:
         self._world = world
         self._walks: dict[str, _Walk] = {}
 

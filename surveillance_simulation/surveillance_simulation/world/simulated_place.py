@@ -32,7 +32,7 @@ _BODY = 0.2
 
 
 @dataclass(frozen=True)
-class Panel:
+class MarkerPanel:
     """A marker as it is now.
 
     Attributes:
@@ -45,7 +45,7 @@ class Panel:
     state: str = 'whole'
 
 
-class World:
+class SimulatedPlace:
     """A place whose doors, things, people, markers and lamps change.
 
     Attributes:
@@ -74,14 +74,14 @@ class World:
         self._people: shapes.Array = np.zeros((0, 4))
         self._robots: dict[str, tuple[float, float, float]] = {}
         self._moves: dict[str, int] = {}
-        self._panels = {name: Panel(marker) for name, marker in plan.markers.items()}
+        self._panels = {name: MarkerPanel(marker) for name, marker in plan.markers.items()}
         self._walls = shapes.boxes_around(plan.wall_pieces(), WALL_THICKNESS)
         self._surface = None if plan.map is None else MapSurface(plan.map.grid)
         self.regions = RoomMap(plan)
         self._refresh()
 
     @classmethod
-    def from_parameters(cls, parameters: Mapping[str, Any]) -> World:
+    def from_parameters(cls, parameters: Mapping[str, Any]) -> SimulatedPlace:
         """Return the world that a place's parameters describe.
 
         Args:
@@ -139,7 +139,7 @@ class World:
         return self._lamps
 
     @property
-    def panels(self) -> Mapping[str, Panel]:
+    def panels(self) -> Mapping[str, MarkerPanel]:
         """Markers by name, as they are now."""
         return self._panels
 
@@ -299,7 +299,7 @@ class World:
                 (),
                 f"marker '{marker.name}': {marker}: expected finite numbers, id >= 0 and size > 0",
             )
-        self._panels[marker.name] = Panel(marker)
+        self._panels[marker.name] = MarkerPanel(marker)
         self._count()
 
     def _count(self) -> None:
@@ -365,10 +365,10 @@ class World:
             raise PlaceError((), f"there is no {kind} '{name}'{known}")
 
 
-def read_world(path: str | Path) -> World:
+def read_simulated_place(path: str | Path) -> SimulatedPlace:
     """Return the world that a place's file describes.
 
     Raises:
         FileError: The file cannot be read, or describes no sound place; one line.
     """
-    return World(read_place(path).plan)
+    return SimulatedPlace(read_place(path).plan)

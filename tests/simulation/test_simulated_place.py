@@ -11,14 +11,14 @@ import pytest
 from benchmarks import regular_places
 from floor_plans import Marker, PlaceError, occupancy_grid, writing
 from strict_files.files import FileError
-from surveillance_simulation.world.world import World, read_world
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
 from .places import CONFIG, changed, two_rooms
 
 
 @pytest.mark.parametrize('name', ['seven_rooms', 'patrol_world', 'office'])
 def test_every_place_of_the_project_is_sound(name: str) -> None:
-    world = read_world(CONFIG / f'{name}.yaml')
+    world = read_simulated_place(CONFIG / f'{name}.yaml')
     for place, (x, y, _) in world.plan.place.positions.items():
         assert world.place_at(x, y) == place
         assert world.is_free(x, y, 0.3)
@@ -39,7 +39,7 @@ def test_office_file_is_what_its_generator_writes() -> None:
     ],
 )
 def test_generated_places_are_sound(parameters: dict, rooms: int, doors: int) -> None:
-    world = World.from_parameters(parameters)
+    world = SimulatedPlace.from_parameters(parameters)
     assert (len(world.plan.place.rooms), len(world.plan.doors)) == (rooms, doors)
 
 
@@ -151,7 +151,7 @@ def test_a_wrong_change_is_refused_in_one_line(change, message: str) -> None:
 )
 def test_a_wrong_place_is_refused_in_one_line(parameters: dict, message: str) -> None:
     with pytest.raises(PlaceError) as caught:
-        World.from_parameters(parameters)
+        SimulatedPlace.from_parameters(parameters)
     assert message in str(caught.value)
     assert '\n' not in str(caught.value)
 
@@ -162,7 +162,7 @@ def test_an_error_in_a_file_names_file_and_line(tmp_path) -> None:
     path.write_text(text.replace('D5: [12.5, 10.0,', 'D5: [12.5, 11.0,'))
     line = 1 + text[: text.index('D5: [12.5')].count('\n')
     with pytest.raises(FileError) as caught:
-        read_world(path)
+        read_simulated_place(path)
     assert str(caught.value).startswith(f'{path}:{line}: doors.D5: (12.5, 11)')
 
 
@@ -176,7 +176,7 @@ def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
 
 
 def test_free_cells_of_the_map_are_free_in_the_world() -> None:
-    world = read_world(CONFIG / 'seven_rooms.yaml')
+    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
     grid = world.plan.grid()
     rows, columns = np.nonzero(grid.cells == occupancy_grid.FREE)
     for row, column in list(zip(rows, columns, strict=True))[::97]:
