@@ -53,7 +53,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.patrol import EXPLORATION_SECONDS, SPEED, random_graph
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
-from patrol_policy.decision import DecisionSettings, Rules
+from patrol_policy.decision import DecisionSettings
 from patrol_policy.fleet.assignment import FleetChoice, FleetRobot, FleetSettings, choose
 from patrol_policy.fleet.charging_bound import PROVEN_UP_TO, charging_wait
 from patrol_policy.fleet.partition import FleetPlan, exact_wait, fleet_plan
@@ -68,6 +68,7 @@ from patrol_policy.fleet.simulation import (
 )
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.patrolling_sim import read_patrolling_sim
+from patrol_policy.rule_table import Priorities
 
 TEAMS = (2, 4, 8)
 ROUNDS, LEFT_OUT, KILLED_AFTER = 8.0, 3.0, 4.0
@@ -241,7 +242,7 @@ def within_rules(graph: PatrolGraph, team: int) -> list[str]:
         place: frozenset({'ROOM', 'CORRIDOR'} if len(ways) > 2 else {'ROOM'})
         for place, ways in graph.leg_seconds.items()
     }
-    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    settings = DecisionSettings(priorities=Priorities())
     policy = ruled(classes, dict.fromkeys(graph.places, tour), settings)
     run = FleetPatrol(graph, starts(graph, team), policy)
     run.until(ROUNDS * tour)

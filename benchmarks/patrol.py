@@ -41,8 +41,8 @@ from benchmarks.literature_policies import LITERATURE
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import read_place
-from patrol_policy.bounds import charge_bound, rule_bound
-from patrol_policy.decision import QUIET, RECHARGE, Rules
+from patrol_policy.bounds import charge_bound, default_table, rule_bound
+from patrol_policy.decision import QUIET, RECHARGE
 from patrol_policy.graph import (
     GraphError,
     PatrolGraph,
@@ -52,6 +52,7 @@ from patrol_policy.hours import Calendar, WeeklyHours
 from patrol_policy.patrolling_sim import read_patrolling_sim
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES
 from patrol_policy.promises import LATER, NEVER, WITHIN, promises
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import (
     Patrol,
     PatrolRun,
@@ -159,10 +160,10 @@ def patrol(
     battery: SimulatedBattery | None = None,
 ) -> PatrolRun:
     """Return one patrol."""
-    rules = Rules() if policy in RULED else Rules(())
+    priorities = Priorities() if policy in RULED else Priorities(())
     run = Patrol(
         place.graph,
-        rules,
+        priorities,
         policy,
         threshold,
         place.start,
@@ -257,7 +258,7 @@ def within_rules(
     for place, factor in itertools.product(places, factors):
         graph, length = place.graph, place.graph.tour.length
         threshold = factor * length
-        bound = rule_bound(graph, threshold, states=states)
+        bound = rule_bound(graph, default_table(graph, threshold), states=states)
         hours = periods * max(length, threshold) / 3600.0
         found = {name: patrol(place, name, hours, threshold).settled / bound.low for name in names}
         reached = bound.within(0.02) or min(found.values()) <= 1.02
@@ -280,7 +281,7 @@ def within_rules(
 def first_choice(count: int) -> None:
     """How long the first choice on a large map takes, and the next ones."""
     place = random_graph(count, SEED)
-    run = Patrol(place.graph, Rules(), DEFAULT_POLICY, URGENCY, place.start)
+    run = Patrol(place.graph, Priorities(), DEFAULT_POLICY, URGENCY, place.start)
     seconds = []
     for _ in range(401):
         began = time.thread_time()
@@ -363,7 +364,7 @@ def with_battery(count: int, states: int) -> None:
         reach, charge = draw.uniform(1.2, 20.0), draw.uniform(0.01, 2.0)
         factor = draw.choice((0.1, 0.5, 1.0, 2.0))
         battery = SimulatedBattery(100.0 / (reach * tour), 100.0 / (charge * tour))
-        run = Patrol(graph, Rules(), DEFAULT_POLICY, factor * tour, place.start, battery)
+        run = Patrol(graph, Priorities(), DEFAULT_POLICY, factor * tour, place.start, battery)
         run.level = battery.limits.stop_recharge
         told = {
             each.place: each for each in promises(run.world(), run.known_battery(), run.settings)
@@ -441,7 +442,7 @@ def month(days: int) -> None:
     tour = graph.tour.length
     run = Patrol(
         graph,
-        Rules(),
+        Priorities(),
         DEFAULT_POLICY,
         0.9 * tour,
         place.start,

@@ -20,9 +20,7 @@ from dataclasses import replace
 from floor_plans import PatrolRules, Station
 from patrol_policy.battery import Battery, ChargeCurve, Energy
 from patrol_policy.decision import (
-    ALERT,
     RECHARGE,
-    URGENT,
     WAIT,
     DecisionSettings,
     RequestError,
@@ -39,6 +37,7 @@ from patrol_policy.fleet import Intention, RightOfWay
 from patrol_policy.graph import GraphError, PatrolGraph
 from patrol_policy.plan import LEG_CHANGE
 from patrol_policy.promises import Promise, promises, summary, verdicts
+from patrol_policy.rule_table import ALERT, URGENT
 from patrol_policy.world import Decision, PolicyMemory, World
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
@@ -236,9 +235,9 @@ class WorldModel:
         experience, settings = self.experience, self.settings
         jump = experience.tell_time(now)
         self._since = now if self._since is None else min(self._since + jump, now)
-        threshold, classes = settings.urgency_threshold, settings.rules.classes
+        threshold, classes = settings.urgency_threshold, settings.priorities.classes
         visits, own = experience.visits, self._rules.thresholds
-        found = self._snapshot(now, classes, interrupt, threshold)
+        found, said = self._snapshot(now, classes, interrupt, threshold)
         self.graph = graph = self._map_of(found, interrupt)
         self.place = found.place
         told = self.fleet.visits() if self.fleet is not None else {}
@@ -246,7 +245,8 @@ class WorldModel:
             place=found.place,
             now=now,
             reachable=tuple(place for place in found.reachable if place in graph.index),
-            classes=self._rules.with_classes(self._by_own_thresholds(found, now)),
+            classes=self._rules.with_classes(found.classes),
+            said=said,
             # The ontology counts whole seconds; another robot's visit may be later.
             visited_at={
                 place: max(
@@ -265,7 +265,7 @@ class WorldModel:
             openings=self._rules.calendar.at(now),
             target=self._target,
             avoided=avoided,
-            rules=classes,
+            priorities=settings.priorities,
             requested=experience.requested,
             contradiction=found.contradiction,
             memory=self._memory,
@@ -274,8 +274,10 @@ class WorldModel:
 
     def _snapshot(
         self, now: float, classes: tuple[str, ...], interrupt: Interrupt, threshold: float
-    ) -> Snapshot:
-        """Return what the ontology says; in a fleet, while it does not answer, what it said last.
+    ) -> tuple[Snapshot, Mapping[str, bool]]:
+        """Return what the ontology says, and of which places whether they are URGENT.
+
+        In a fleet, while it does not answer, what it said last.
 
         Raises:
             CallError: It does not answer, and nothing is known yet.
@@ -284,7 +286,7 @@ class WorldModel:
         if self._cut_off and last is not None and not self._ontology.answers():
             here = self._ontology.await_place(self.place, 0.0, interrupt) or self.place
             if here in last.connections:
-                return self._as_known(last, here, now, threshold)
+                return self._as_known(last, here)
         try:
             self._last = self._ontology.snapshot(
                 now,
@@ -303,57 +305,47 @@ class WorldModel:
             if not self._cut_off:
                 self._warn(f'{error}: patrolling on by what was known')
             self._cut_off = True
-            return self._as_known(last, here, now, threshold)
+            return self._as_known(last, here)
         if self._cut_off:
             self._tell('the ontology answers again: it is told of the visits since')
         self._cut_off = False
-        return self._last
+        return self._last, self._said(self._last)
 
-    def _by_own_thresholds(self, found: Snapshot, now: float) -> Mapping[str, frozenset[str]]:
-        """Return the classes of places, also from an ontology that knows one threshold for all.
+    def _said(self, found: Snapshot) -> dict[str, bool]:
+        """Return of which places the ontology's word counts, and whether it holds them URGENT.
 
-        There, a place with a longer threshold of its own is URGENT too early. What was noticed in
-        an ALERT counts at once.
+        An ontology that knows one threshold for all says nothing of a place with its own, unless
+        nobody was there yet, or something was noticed there.
         """
-        classes = dict(found.classes)
-        for place, limit in self._rules.thresholds.items():
-            kinds = classes.get(place, frozenset())
-            if place in found.thresholds or ALERT in kinds or place not in found.visited_at:
-                continue
-            if now - found.visited_at[place] <= limit:
-                classes[place] = kinds - {URGENT}
-        return classes
+        return {
+            place: URGENT in kinds
+            for place, kinds in found.classes.items()
+            if place not in self._rules.thresholds
+            or place in found.thresholds
+            or place not in found.visited_at
+            or ALERT in kinds
+        }
 
-    def _as_known(self, last: Snapshot, here: str, now: float, threshold: float) -> Snapshot:
-        """Return a snapshot of what was known and what was seen since: the map is as it was."""
+    def _as_known(self, last: Snapshot, here: str) -> tuple[Snapshot, Mapping[str, bool]]:
+        """Return what was known and what was seen since: the map is as it was.
+
+        How long places wait says which are URGENT, and beside that what nobody has seen to.
+        """
         assert self.fleet is not None
         seen = dict(last.visited_at)
         for visits in (self.experience.visits, self.fleet.visits()):
             for place, at in visits.items():
                 if place in last.connections:
                     seen[place] = max(at, seen.get(place, -1.0))
-        limits = {**self._rules.thresholds, **last.thresholds}
-        late = {
-            place
-            for place in last.connections
+        said = {
+            place: True
+            for place, kinds in last.classes.items()
             if place not in seen
-            or now - seen[place] > limits.get(place, threshold)
             # Something was noticed there, and nobody came since.
-            or (
-                {ALERT, URGENT} <= last.classes[place] and seen[place] == last.visited_at.get(place)
-            )
+            or ({ALERT, URGENT} <= kinds and seen[place] == last.visited_at.get(place))
         }
-        classes = {
-            place: (found - {URGENT}) | ({URGENT} if place in late else set())
-            for place, found in last.classes.items()
-        }
-        return replace(
-            last,
-            place=here,
-            reachable=last.connections[here],
-            classes={place: frozenset(found) for place, found in classes.items()},
-            visited_at=seen,
-        )
+        known = replace(last, place=here, reachable=last.connections[here], visited_at=seen)
+        return known, said
 
     def _map_of(self, found: Snapshot, interrupt: Interrupt) -> PatrolGraph:
         # A place that went may come back elsewhere.
@@ -469,7 +461,7 @@ class WorldModel:
 
     def _check_rules(self, interrupt: Interrupt) -> None:
         """Say which class of the rules no place can ever be in."""
-        classes = self.settings.rules.classes
+        classes = self.settings.priorities.classes
         if classes == self._checked_rules:
             return
         known = self._ontology.place_classes(interrupt)

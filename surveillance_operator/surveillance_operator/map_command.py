@@ -75,7 +75,6 @@ def promised(
         threshold=threshold,
         own_thresholds=rules.thresholds,
         openings=rules.calendar.at(now),
-        rules=settings.rules.classes,
     )
     battery = Battery()
     if battery_seconds is not None:

@@ -18,8 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from patrol_policy.decision import URGENT, DecisionSettings, Rules
+from patrol_policy.decision import DecisionSettings
 from patrol_policy.fleet import FleetSettings, Layout
+from patrol_policy.rule_table import URGENT, Priorities
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
@@ -127,7 +128,7 @@ class Robot:
         )
         self.written = MissionRecord(self.record)
         settings = DecisionSettings(
-            rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')), urgency_threshold=int(THRESHOLD)
+            priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')), urgency_threshold=int(THRESHOLD)
         )
         self.model = WorldModel(
             settings,

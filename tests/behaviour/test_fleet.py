@@ -11,8 +11,9 @@ from types import MappingProxyType
 import pytest
 
 from floor_plans import Station
-from patrol_policy.decision import SHARE, URGENT, WAIT, DecisionSettings, Rules
+from patrol_policy.decision import SHARE, WAIT, DecisionSettings
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
+from patrol_policy.rule_table import URGENT, Priorities
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
@@ -85,7 +86,7 @@ class Robot:
         self.fleet = FleetKnowledge(
             name, FleetSettings(silent_after=10.0), WIDE, air.say, lambda: air.now
         )
-        settings = DecisionSettings(rules=Rules(rules), urgency_threshold=240)
+        settings = DecisionSettings(priorities=Priorities(rules), urgency_threshold=240)
         self.said: list[str] = []
         self.model = WorldModel(
             settings,

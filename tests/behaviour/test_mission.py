@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from patrol_policy.decision import Rules
+from patrol_policy.rule_table import Priorities
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
@@ -232,7 +232,7 @@ def test_a_threshold_that_nobody_can_keep_to_is_warned_of_once(machine: str) -> 
 def test_a_rule_of_a_class_that_the_ontology_does_not_have_is_told_once(machine: str) -> None:
     world = World()
     mission_settings = settings()
-    mission_settings.choice.rules = Rules(('URGANT', 'CORRIDOR'))
+    mission_settings.choice.priorities = Priorities(('URGANT', 'CORRIDOR'))
     Run(machine, world, mission_settings).until(100.0)
     assert [text for text in world.said if 'rooms_priority' in text] == [
         "rooms_priority: the ontology has no class 'URGANT' of places, expected 'URGENT'; "

@@ -205,7 +205,7 @@ def test_what_a_person_sets_reaches_the_node_that_decides(
     assert actions.set_policy('oldest') == "policy of robot_behavior is 'oldest'"
     graph.until(lambda: (follows.urgency_threshold, follows.policy) == (90, 'oldest'))
     actions.set_parameter('robot_behavior', 'rooms_priority', '[ROOM]')
-    graph.until(lambda: follows.rules.classes == ('ROOM',))
+    graph.until(lambda: follows.priorities.classes == ('ROOM',))
     levels = {'battery_require_recharge': 92, 'battery_stop_recharge': 95}
     together = [Parameter(name, value=value) for name, value in levels.items()]
     assert behaviour.set_parameters_atomically(together).successful

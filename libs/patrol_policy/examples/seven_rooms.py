@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from patrol_policy.decision import Rules
 from patrol_policy.graph import graph_of_places
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
 
 POSITIONS = {
@@ -36,7 +36,7 @@ def main() -> None:
         threshold = factor * tour
         print(f'\nurgency threshold {threshold:.1f} s')
         for policy in ('tour', 'lookahead', 'oldest', 'seed'):
-            patrol = Patrol(graph, Rules(), policy, threshold, station='E')
+            patrol = Patrol(graph, Priorities(), policy, threshold, station='E')
             first = patrol.step()
             for _ in patrol.until(HOURS * 3600.0):
                 pass

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from patrol_policy.battery import BatteryLimits as BatteryLimits
     from patrol_policy.decision import DecisionSettings as DecisionSettings
     from patrol_policy.decision import NowhereToGoError as NowhereToGoError
-    from patrol_policy.decision import Rules as Rules
     from patrol_policy.decision import WhyNot as WhyNot
     from patrol_policy.decision import decide as decide
     from patrol_policy.decision import why_not as why_not
     from patrol_policy.graph import GraphError as GraphError
     from patrol_policy.graph import PatrolGraph as PatrolGraph
     from patrol_policy.graph import graph_of_places as graph_of_places
+    from patrol_policy.rule_table import Priorities as Priorities
     from patrol_policy.world import Decision as Decision
     from patrol_policy.world import World as World
 
@@ -34,7 +34,7 @@ _HOME = {
     'GraphError': 'patrol_policy.graph',
     'NowhereToGoError': 'patrol_policy.decision',
     'PatrolGraph': 'patrol_policy.graph',
-    'Rules': 'patrol_policy.decision',
+    'Priorities': 'patrol_policy.rule_table',
     'WhyNot': 'patrol_policy.decision',
     'World': 'patrol_policy.world',
     'decide': 'patrol_policy.decision',

@@ -26,7 +26,7 @@ all places, wherever that begins; and on average only the other part of time is 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from patrol_policy.battery import WORTH_CHARGING
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.rollout import RuleMap
+from patrol_policy.rule_table import DEFAULT_PRIORITIES, RuleTable
 from patrol_policy.tour import EXACT_UP_TO, shortest_tour
 
 CORE_UP_TO = 20
@@ -66,21 +67,20 @@ class RuleBound:
         return self.high <= self.low * (1.0 + precision)
 
 
-def default_ranks(graph: PatrolGraph) -> list[int]:
-    """Return the ranks of the default rules: places with several ways before those with one."""
-    return [1 if len(graph.leg_seconds[place]) > 1 else 2 for place in graph.places]
+def default_table(graph: PatrolGraph, threshold: float) -> RuleTable:
+    """Return the default rules: what is URGENT, then places with several ways, then all others."""
+    base = [1 if len(graph.leg_seconds[place]) > 1 else 2 for place in graph.places]
+    return RuleTable(DEFAULT_PRIORITIES, base, [0] * len(base), [threshold] * len(base))
 
 
-def simple_bound(graph: PatrolGraph, threshold: float, ranks: Sequence[int] | None = None) -> float:
+def simple_bound(graph: PatrolGraph, table: RuleTable) -> float:
     """Return a wait from visit to visit that no robot can go below, seconds; see `rule_bound`."""
-    rules = RuleMap(graph, threshold, ranks or default_ranks(graph), 0)
-    return max(graph.tour.bound, rules.least_period)
+    return max(graph.tour.bound, RuleMap(graph, table).least_period)
 
 
 def rule_bound(
     graph: PatrolGraph,
-    threshold: float,
-    ranks: Sequence[int] | None = None,
+    table: RuleTable,
     precision: float = 0.01,
     states: int = STATES,
 ) -> RuleBound:
@@ -88,17 +88,15 @@ def rule_bound(
 
     Args:
         graph: The map.
-        threshold: Seconds after which a place is URGENT, which comes before everything.
-        ranks: Priority of each place while it is not URGENT, less comes first; default: see
-            `default_ranks`.
+        table: The rules; `default_table` has those of an assignment.
         precision: The bounds that are looked for differ by this part at most.
         states: How many states may be visited in all.
     """
-    low, high = simple_bound(graph, threshold, ranks), math.inf
+    low, high = simple_bound(graph, table), math.inf
     covers = covers_of(graph)
     if len(covers.core) > CORE_UP_TO:
         return RuleBound(low)
-    search = _Search(RuleMap(graph, threshold, ranks or default_ranks(graph), 0), covers, states)
+    search = _Search(RuleMap(graph, table), covers, states)
     step = 0.9 * precision
     while high > low * (1.0 + precision):
         limit = min(low * (1.0 + step), (low + high) / 2.0)
@@ -124,7 +122,6 @@ class _Search:
     def __init__(self, rules: RuleMap, covers: Covers, states: int) -> None:
         self._rules, self._left = rules, states
         self._legs = _legs_in_ticks(rules)
-        self._threshold = round(TICKS * rules.threshold)
         self._covers = covers
 
     def goes_on(self, limit: float) -> bool | None:
@@ -159,31 +156,28 @@ class _Search:
 
     def _moves(self, state: State) -> list[tuple[int, int]]:
         """Return the legs that the rules may allow, the place that waited longest last."""
-        return _lawful_moves(self._rules.ranks, self._legs[state[0]], self._threshold, state)
+        return possible_moves(self._rules.table, self._legs[state[0]], state)
 
 
-def _legs_in_ticks(rules: RuleMap) -> list[list[tuple[int, int]]]:
+def _legs_in_ticks(rules: RuleMap) -> list[dict[int, int]]:
     """Return for each place its neighbours and the ticks to them."""
     return [
-        [(other, round(TICKS * seconds)) for other, seconds in ways.items()]
+        {other: round(TICKS * seconds) for other, seconds in ways.items()}
         for ways in rules.leg_seconds[: rules.count]
     ]
 
 
-def _lawful_moves(
-    ranks: Sequence[int], legs: Sequence[tuple[int, int]], threshold: int, state: State
+def possible_moves(
+    table: RuleTable, legs: Mapping[int, int], state: State
 ) -> list[tuple[int, int]]:
-    """Return the legs that the rules may allow, the place that waited longest last."""
+    """Return the legs that the rules may allow, the place that waited longest last.
+
+    How long a place went unvisited that the search has not met yet is not known: so long at least.
+    """
     _, met, ages = state
-    allowed, least = [], math.inf
-    for other, ticks in legs:
-        urgent = ages[other] > threshold
-        known = urgent or met >> other & 1
-        worst = 0 if urgent else ranks[other]
-        allowed.append((worst if known else 0, other, ticks))
-        least = min(least, worst)
-    moves = [(other, ticks) for best, other, ticks in allowed if best <= least]
-    return sorted(moves, key=lambda move: ages[move[0]])
+    waits = {other: ages[other] / TICKS for other in legs}
+    allowed = table.possibly_first(waits, lambda other: bool(met >> other & 1))
+    return sorted(((other, legs[other]) for other in allowed), key=lambda move: ages[move[0]])
 
 
 def _after(state: State, place: int, ticks: int) -> State:
@@ -363,7 +357,6 @@ class _ChargeSearch:
         self._rules, self._energy, self._left = rules, energy, states
         self._cover: list[list[int]] = cover.tolist()
         self._legs = _legs_in_ticks(rules)
-        self._threshold = round(TICKS * rules.threshold)
         self._worth = math.floor(TICKS * WORTH_CHARGING / energy.draw) - 1
         # How long it may be at work until it leaves each place, rather too long than too short.
         self._usable = [
@@ -402,9 +395,7 @@ class _ChargeSearch:
     def _following(self, state: ChargeState, longest: int) -> list[ChargeState]:
         """Return the states that may come next, the place that waited longest last."""
         place, met, ages, used = state
-        moves = _lawful_moves(
-            self._rules.ranks, self._legs[place], self._threshold, (place, met, ages)
-        )
+        moves = possible_moves(self._rules.table, self._legs[place], (place, met, ages))
         found = []
         for other, ticks in moves:
             if used + ticks <= self._usable[other] and ages[other] + ticks <= longest:

@@ -4,7 +4,7 @@
 comes in as a `World`, a `Battery` and `DecisionSettings`. `why_not` answers from the same steps
 why a place is not chosen.
 
-The rules are a list of classes of places in order of priority. The first class that has a
+The rules are classes of places in order of priority (`rule_table`). The first class that has a
 reachable member decides: its members are the candidates, and the policy chooses among them. Where
 the way to the chosen place and home from there takes more than the charge, the robot charges first.
 A policy that plans ahead may also choose to charge, where that costs least.
@@ -13,7 +13,6 @@ A policy that plans ahead may also choose to charge, where that costs least.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -28,6 +27,13 @@ from patrol_policy.battery import (
 )
 from patrol_policy.fleet.assignment import FleetOutlook, Share
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
+from patrol_policy.rule_table import (
+    ANY,
+    DEFAULT_PRIORITIES,
+    Priorities,
+    is_by_waiting,
+    priorities_expected,
+)
 from patrol_policy.world import Decision, World
 from strict_files.settings import converted, names_expected, parameter, parameters
 from strict_files.suggestions import nearest
@@ -42,14 +48,6 @@ SHARE = 'share'
 """The rule of a decision that a fleet's share asks for, where the rules ask nothing."""
 WAIT = 'wait'
 """The rule of a decision to stay: another robot of the fleet goes first, or has the dock."""
-ANY = 'any'
-"""The rule of a decision for which no class had a reachable member."""
-URGENT = 'URGENT'
-ALERT = 'ALERT'
-"""The class of places in which something was noticed: what makes them URGENT is not their wait."""
-DEFAULT_RULES = (URGENT, 'CORRIDOR', 'ROOM')
-
-
 LONGEST_THRESHOLD = 10**9
 """Seconds: 31 years."""
 
@@ -70,57 +68,6 @@ class RequestError(NowhereToGoError):
     """The place that an operator asked for cannot be reached."""
 
 
-@dataclass(frozen=True)
-class Rules:
-    """Classes of places by falling priority.
-
-    Attributes:
-        classes: Names of classes of the ontology; with none, every reachable place may be chosen.
-
-    Raises:
-        ValueError: A name is no class name, or stands twice.
-    """
-
-    classes: tuple[str, ...] = DEFAULT_RULES
-
-    def __post_init__(self) -> None:
-        for position, name in enumerate(self.classes):
-            if not re.fullmatch(r'[A-Za-z_][\w.-]*', name):
-                raise ValueError(f'{name!r} is not the name of a class of places')
-            if name in self.classes[:position]:
-                raise ValueError(f'{name} stands twice in the list of rules')
-
-    def candidates(self, world: World) -> tuple[str, tuple[str, ...]]:
-        """Return the rule whose turn it is and the places it allows, sorted.
-
-        Places that could not be reached lately only count when nothing else can be reached.
-
-        Raises:
-            NowhereToGoError: Nothing is reachable.
-        """
-        reachable = [place for place in world.reachable if place != world.place]
-        if not reachable:
-            raise NowhereToGoError(f'nothing can be reached from {world.place}')
-        reachable = [place for place in reachable if not is_closed(world, place)]
-        if not reachable:
-            raise NothingOpenError(f'nothing that can be reached from {world.place} is open')
-        open_places = [place for place in reachable if place not in world.avoided] or reachable
-        for name in self.classes:
-            members = [p for p in open_places if name in classes_of(world, p)]
-            if members:
-                return name, tuple(sorted(members))
-        return ANY, tuple(sorted(open_places))
-
-
-def rules_expected(names: Sequence[str]) -> str | None:
-    """Ask for classes of places that the rules know, each once."""
-    try:
-        Rules(tuple(names))
-    except ValueError as error:
-        return f'names of classes of places, each once ({error})'
-    return None
-
-
 @dataclass
 class DecisionSettings:
     """What a decision depends on beside the world and the battery; may be changed in between.
@@ -129,13 +76,13 @@ class DecisionSettings:
         battery: When to charge.
     """
 
-    rules: Rules = converted(
-        lambda names: Rules(tuple(names)),
-        DEFAULT_RULES,
+    priorities: Priorities = converted(
+        lambda entries: Priorities(tuple(entries)),
+        DEFAULT_PRIORITIES,
         'Classes of places by falling priority; empty: any place within reach.',
         name='rooms_priority',
         of=str,
-        check=rules_expected,
+        check=priorities_expected,
     )
     policy: str = parameter(
         DEFAULT_POLICY,
@@ -161,19 +108,31 @@ class DecisionSettings:
     )
 
 
-def classes_of(world: World, place: str) -> frozenset[str]:
-    """Return the classes of a place, as its own threshold and its hours leave them.
+def enterable(world: World) -> list[str]:
+    """Return the places that may be entered next, whatever their class.
 
-    A place that is past its own threshold is URGENT. One that only may be visited now is not,
-    unless it is an ALERT that made it so.
+    Those that could not be reached lately only count when nothing else can be reached.
+
+    Raises:
+        NowhereToGoError: Nothing is reachable.
+        NothingOpenError: Nothing that is reachable is open.
     """
-    classes = world.classes.get(place, frozenset())
-    if place in world.openings.optional:
-        return classes if ALERT in classes else classes - {URGENT}
-    own = world.own_thresholds.get(place)
-    if own is not None and place in world.visited_at and world.unvisited(place) > own:
-        return classes | {URGENT}
-    return classes
+    reachable = [place for place in world.reachable if place != world.place]
+    if not reachable:
+        raise NowhereToGoError(f'nothing can be reached from {world.place}')
+    reachable = [place for place in reachable if not is_closed(world, place)]
+    if not reachable:
+        raise NothingOpenError(f'nothing that can be reached from {world.place} is open')
+    return [place for place in reachable if place not in world.avoided] or reachable
+
+
+def candidates(world: World) -> tuple[str, tuple[str, ...]]:
+    """Return the class whose turn it is and the places that may be chosen, sorted; see `enterable`.
+
+    Raises:
+        NowhereToGoError: Nothing is reachable.
+    """
+    return world.first_of(enterable(world))
 
 
 def is_closed(world: World, place: str) -> bool:
@@ -248,10 +207,10 @@ def _decide(world: World, battery: Battery, settings: DecisionSettings) -> Decis
         return _as_requested(world)
     if world.openings.quiet_for > 0.0:
         return _stay(world, settings, f'quiet hours for {world.openings.quiet_for:.0f} s more')
-    world = world_with_charge(world, battery)
+    world = planning_view(world, battery, settings)
     energy = energy_of(world, battery, settings)
     try:
-        rule, allowed = settings.rules.candidates(_within_range(world, energy))
+        rule, allowed = candidates(_within_range(world, energy))
     except (NothingOpenError, OutOfRangeError) as error:
         return _stay(world, settings, str(error))
     if world.fleet is not None:
@@ -300,16 +259,11 @@ def _shared(
         return Decision(
             **common, place=here, target=here, rule=WAIT, reason=choice.reason, stay=stay
         )
-    mine = choice.mine
-    classes = {
-        place: found if place in mine else found - {URGENT}
-        for place, found in ((p, classes_of(world, p)) for p in world.graph.places)
-    }
-    own = {p: limit if p in mine else math.inf for p, limit in world.own_thresholds.items()}
-    rule, allowed = settings.rules.candidates(replace(within, classes=classes, own_thresholds=own))
+    others = dict.fromkeys(set(world.graph.places) - choice.mine, False)
+    mine = replace(within, said={**within.said, **others})
+    rule, allowed = candidates(mine)
     goal, graph = choice.place, world.graph
-    enterable = frozenset(Rules(()).candidates(within)[1])
-    if rule != URGENT and (far := _overdue(world, fleet, choice.share, settings, enterable)):
+    if not is_by_waiting(rule) and (far := _overdue(world, fleet, choice.share, enterable(within))):
         common['share'] = Share(choice.share.tour, far)
         step = graph.route(here, far)[0]
         reason = (
@@ -319,7 +273,8 @@ def _shared(
         return Decision(**common, place=step, target=far, rule=SHARE, reason=reason)
     # It stays where the rules would have it go; but as others pass stops over and overtake it again
     # and again, not for ever.
-    fits = rule == ANY or (rule in classes[here] and rule != URGENT and not choice.overstays)
+    is_of_rule = not is_by_waiting(rule) and world.is_in(here, rule)
+    fits = rule == ANY or (is_of_rule and not choice.overstays)
     if goal == here and fits:
         stay = max(1.0, (choice.until or world.now + 1.0) - world.now)
         reason = choice.reason
@@ -328,8 +283,9 @@ def _shared(
     if goal in graph.index and goal != here and (step := graph.route(here, goal)[0]) in allowed:
         return Decision(**common, place=step, target=goal, rule=rule, reason=choice.reason)
     for stop in _onward(choice.share):
-        wanted = rule == ANY or not classes.get(stop, frozenset()).isdisjoint((rule, URGENT))
-        if wanted and stop != here and stop in graph.index:
+        if stop == here or stop not in graph.index:
+            continue
+        if rule == ANY or mine.is_in(stop, rule) or mine.is_urgent(stop):
             step = graph.route(here, stop)[0]
             if step in allowed:
                 common['share'] = Share(choice.share.tour, stop)
@@ -357,8 +313,7 @@ def _overdue(
     world: World,
     fleet: FleetOutlook,
     share: Share,
-    settings: DecisionSettings,
-    enterable: Collection[str],
+    onward: Collection[str],
 ) -> str:
     """Return a stop of the robot's group that has been URGENT for a whole tour; empty: none.
 
@@ -371,17 +326,16 @@ def _overdue(
         world: What is known.
         fleet: The same of all robots.
         share: What the robot drives to by its share.
-        settings: Of decisions.
-        enterable: The neighbours that may be entered now, whatever their class.
+        onward: The neighbours that may be entered now, whatever their class.
     """
-    if URGENT not in settings.rules.classes:
+    if not world.table.has_urgent:
         return ''
     late = fleet.graph.tour.length
 
     def can_go(stop: str) -> bool:
         if stop == world.place or stop not in world.graph.index or stop in world.avoided:
             return False
-        return not is_closed(world, stop) and world.graph.route(world.place, stop)[0] in enterable
+        return not is_closed(world, stop) and world.graph.route(world.place, stop)[0] in onward
 
     overdue = [
         stop
@@ -419,14 +373,13 @@ def _onward(share: Share) -> tuple[str, ...]:
     return share.tour[first:] + share.tour[:first]
 
 
-def world_with_charge(world: World, battery: Battery) -> World:
-    """Return a world that knows the charge, and the thresholds of places as the hours leave them.
+def planning_view(world: World, battery: Battery, settings: DecisionSettings) -> World:
+    """Return the world as the policies see it.
 
-    Nobody waits for a place that only may be visited now.
+    It knows the rules and the charge, and its map has no places that stay closed for longer than a
+    plan looks ahead.
     """
     level = 100.0 if battery.level is None else battery.level
-    optional = dict.fromkeys(world.openings.optional, math.inf)
-    own = {**world.own_thresholds, **optional}
     openings, graph = world.openings, world.graph
     # What opens soon is part of the plan, though it is not entered before.
     gone = [
@@ -436,9 +389,10 @@ def world_with_charge(world: World, battery: Battery) -> World:
     ]
     if gone:
         graph = world.memory.without(graph, frozenset(gone), world.place)
-    changed = {place: classes_of(world, place) for place in own}
-    classes = {**world.classes, **changed} if changed else world.classes
-    return replace(world, level=level, own_thresholds=own, graph=graph, classes=classes)
+    known = level, graph, settings.priorities
+    if known == (world.level, world.graph, world.priorities):
+        return world
+    return replace(world, level=level, graph=graph, priorities=settings.priorities)
 
 
 def _within_range(world: World, energy: Energy | None) -> World:
@@ -566,7 +520,7 @@ def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, polic
             -order.index(place),
         ),
     )
-    threshold = f', threshold {world.threshold_of(best):g} s' if rule == URGENT else ''
+    threshold = f', threshold {world.threshold_of(best):g} s' if is_by_waiting(rule) else ''
     name = f'{best} ({world.wait_in_words(best)}{threshold})'
     kind = 'place' if rule == ANY else f'{rule} place'
     if len(allowed) == 1:
@@ -696,6 +650,6 @@ def _premises(place: str, world: World, rule: str) -> tuple[str, ...]:
         ),
     ]
     if rule:
-        facts.append((f'{place} is {rule}', rule in classes_of(world, place)))
+        facts.append((f'{place} is {rule}', world.is_in(place, rule)))
     facts.sort(key=lambda fact: fact[1])
     return tuple(f'{fact}: {"holds" if holds else "missing"}' for fact, holds in facts)

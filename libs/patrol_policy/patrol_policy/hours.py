@@ -190,6 +190,7 @@ class Openings:
         windows: From when to when places with hours are open and the robot may go there, seconds
             since 1970, from a day ago up to a week ahead.
         has_quiet: Whether there are quiet hours at all.
+        zone: The time zone of the clock on the wall; None: that of the machine.
     """
 
     closed: Mapping[str, str]
@@ -199,6 +200,7 @@ class Openings:
     opens_in: Mapping[str, float] = field(default_factory=dict)
     windows: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     has_quiet: bool = False
+    zone: tzinfo | None = None
 
 
 @dataclass(frozen=True)
@@ -267,6 +269,7 @@ class Calendar:
             opens_in,
             windows,
             self.quiet is not None,
+            self.zone,
         )
 
     def _known_of(self, hours: WeeklyHours, now: float) -> _Known:

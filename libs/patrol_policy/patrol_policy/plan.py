@@ -26,8 +26,6 @@ from dataclasses import dataclass, replace
 
 from patrol_policy.battery import WORTH_CHARGING, Energy
 from patrol_policy.rollout import (
-    HALF_OPEN,
-    URGENT,
     Choice,
     Outcome,
     RuleMap,
@@ -38,6 +36,7 @@ from patrol_policy.rollout import (
     rule_map,
 )
 from patrol_policy.rounds import GOOD_ENOUGH, Round, RoundSearch
+from patrol_policy.rule_table import HALF_OPEN
 from patrol_policy.world import World
 
 FIRST_WORK = 360_000.0
@@ -112,24 +111,25 @@ class Course:
 
     def _target(self, rules: RuleMap, state: State) -> int:
         """Move on to the next target that is not to be skipped, and return it."""
-        place = state.place
+        place, times = state.place, state.due or rules.due(state)
         for _ in self.targets:
             target = self.targets[state.position]
             if target >= rules.count:
                 if not _is_full(rules, state, target) and rules.places[target] not in state.avoided:
                     return target
             elif target != place and target not in state.avoided:
-                idle = state.now - state.seen[target]
                 if target in rules.windows and not rules.is_open(
                     target, state.now, rules.away[place][target]
                 ):
                     state.position = self.after(state.position)
                     continue
-                if idle >= self.skip:
+                # What the ontology holds URGENT is due, however lately it was visited.
+                due = times[target]
+                if state.now - state.seen[target] >= self.skip or due == -math.inf:
                     gate = rules.gates[target]
                     if gate < 0:
                         return target
-                    wait = rules.thresholds[target] - idle - rules.away[place][gate]
+                    wait = due - HALF_OPEN / 2.0 - state.now - rules.away[place][gate]
                     if wait <= self.patience:
                         return target
             state.position = self.after(state.position)
@@ -171,10 +171,11 @@ class Plan:
 
     Attributes:
         rules: The map with its rules.
+        state: Where the patrol stands.
         cut: What the deadline has cut off, in words; empty: nothing.
     """
 
-    _state: State
+    state: State
     _began: State
     _lap: float  # Length of the shortest round that is known, rules and charges left aside.
 
@@ -183,7 +184,6 @@ class Plan:
     ) -> None:
         # Processor time of this thread: a busy machine makes the search slower, not worse.
         self._deadline = time.thread_time() + MOST_SECONDS
-        self._key = world.threshold, world.own_thresholds, world.rules
         # What opens or closes later than that is looked at then.
         self._from, self._changes = world.now, world.changes(world.now + world.look_ahead)
         self.rules = rules = rule_map(world, energy)
@@ -192,7 +192,7 @@ class Plan:
         # Waits that began under the plan before count like all others: else each new plan might
         # turn on the round once, and the places behind would wait for two rounds.
         met = [before is not None] * rules.count
-        self._state = State(world.graph.index[world.place], world.now, [], met)
+        self.state = State(world.graph.index[world.place], world.now, [], met)
         self._observe(world, 100.0 if energy is None else world.level)
         work = FIRST_WORK * min(1.0, rules.count / FULL_FROM, FULL_UP_TO / rules.count)
         if before and before.places == self.places and before.stations == self.stations:
@@ -212,7 +212,7 @@ class Plan:
         Times and rates that differ a little keep the plan.
         """
         planned, graph = self.rules.graph, world.graph
-        if self._key != (world.threshold, world.own_thresholds, world.rules):
+        if world.table is not self.rules.table and world.table != self.rules.table:
             return False
         if world.now < self._from - HALF_OPEN:
             return False
@@ -238,15 +238,15 @@ class Plan:
     def for_a_question(self) -> Plan:
         """Return a copy that says where its course leads from now on, and changes nothing."""
         plan = copy(self)
-        plan._state = replace(self._state, met=self._state.met.copy())
+        plan.state = replace(self.state, met=self.state.met.copy())
         return plan
 
     def advance(self, world: World) -> tuple[int, int]:
         """Return the stop to go to and the target that it leads to, as indices."""
         self._observe(world, world.level)
-        choice = self._course.choose(self.rules, self._state)
-        target = self._course.targets[self._state.position]
-        stop = self.rules.guarded(self._state, choice)
+        choice = self._course.choose(self.rules, self.state)
+        target = self._course.targets[self.state.position]
+        stop = self.rules.guarded(self.state, choice)
         return stop, target if stop < self.rules.count else stop
 
     @property
@@ -267,7 +267,7 @@ class Plan:
     @property
     def course(self) -> Course:
         """What is left of the course from where the robot is on it."""
-        return self._course.seen_from(self._state.position)
+        return self._course.seen_from(self.state.position)
 
     @property
     def longest(self) -> float:
@@ -332,21 +332,17 @@ class Plan:
 
     def _observe(self, world: World, level: float) -> None:
         """Take where the patrol stands."""
-        graph, met, seen = world.graph, self._state.met, []
-        thresholds = self.rules.thresholds
-        for place, threshold in zip(graph.places, thresholds, strict=True):
-            last = world.visited_at.get(place, world.since)
-            if world.now - last <= threshold and URGENT in world.classes.get(place, ()):
-                # The ontology knows better: it was never visited, or something was noticed there.
-                limit = threshold if math.isfinite(threshold) else world.threshold
-                last = world.now - limit - HALF_OPEN
-            seen.append(last)
+        graph, met = world.graph, self.state.met
+        seen = [world.visited_at.get(place, world.since) for place in graph.places]
+        index = graph.index
+        said = {index[place]: world.said_of(place) for place in world.said if place in index}
+        due = self.rules.table.due_times(world.now, seen, said)
         here = graph.index[world.place]
-        if here != self._state.place:
+        if here != self.state.place:
             met[here] = True
         avoided = frozenset(graph.index[name] for name in world.avoided if name in graph.index)
-        position = self._state.position
-        self._state = State(here, world.now, seen, met, avoided, position, level)
+        position = self.state.position
+        self.state = State(here, world.now, seen, met, avoided, position, level, due)
 
     def _begin(
         self, rounds: list[tuple[int, ...]], work: float, course: Course | None = None
@@ -375,7 +371,7 @@ class Plan:
         self._horizon = max(self._horizon, HORIZON * self._search.best.length)
         self._course = course or self._entered(self._search.best, 0)
         self._outcome = self._followed(self._course, math.inf)
-        self._began = self._state
+        self._began = self.state
         end = self._work + work
         for candidate in self._candidates():
             if self._work > end or self._is_finished() or self._late():
@@ -404,7 +400,7 @@ class Plan:
 
         A level above that at which charges end is had once only.
         """
-        state, energy = self._state, self.rules.energy
+        state, energy = self.state, self.rules.energy
         if energy is not None and state.level > energy.full:
             state = replace(state, level=energy.full)
         outcome = roll_out(self.rules, choose, state, self._horizon, stop, self._late)
@@ -439,7 +435,7 @@ class Plan:
         windows = self.rules.windows
 
         def closes(place: int) -> tuple[float, float]:
-            known = [(last, first) for first, last in windows[place] if last > self._state.now]
+            known = [(last, first) for first, last in windows[place] if last > self.state.now]
             return min(known, default=(math.inf, math.inf))
 
         for place in sorted(windows, key=closes):
@@ -475,7 +471,7 @@ class Plan:
         most = max(self._outcome.settled, self._accepted) + 1e-6
         if outcome.settled <= most and self._grade(outcome) < self._grade(self._outcome):
             self._course, self._outcome = course, outcome
-            self._state.position = 0
+            self.state.position = 0
 
     def _followed(self, course: Course, stop: float) -> Outcome:
         """Return what a course comes to from here."""
@@ -511,7 +507,7 @@ class Plan:
         How long each place would wait follows from the times of the round; what the rules demand
         in between is left to the simulation.
         """
-        rules, state, targets = self.rules, self._state, found.targets
+        rules, state, targets = self.rules, self.state, found.targets
         count, away, here = len(targets), rules.away, state.place
         times = [0.0]
         for before, after in zip(targets, (*targets[1:], targets[0]), strict=True):
@@ -531,7 +527,7 @@ class Plan:
                 place = rules.places[target]
                 wait = begin + times[position % count] + idle[place]
                 wait += length if position >= count else 0.0
-                if rules.gates[place] >= 0 and wait <= rules.overdue_after[place]:
+                if rules.gates[place] >= 0 and state.now + wait - idle[place] <= state.due[place]:
                     wait += length
                 waits[place] = min(wait, waits.get(place, math.inf))
             return max(wait - rules.slack[place] for place, wait in waits.items())

@@ -14,17 +14,16 @@ from dataclasses import dataclass, replace
 
 from patrol_policy.battery import Battery, Energy
 from patrol_policy.decision import (
-    URGENT,
     DecisionSettings,
-    classes_of,
     energy_of,
+    planning_view,
     stations_within_reach,
-    world_with_charge,
 )
 from patrol_policy.fleet.assignment import FleetOutlook
 from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, FleetPolicy
 from patrol_policy.plan import plan_of
+from patrol_policy.rule_table import RuleTable
 from patrol_policy.world import World
 
 WITHIN, LATER, NEVER, UNKNOWN = 'within', 'later', 'never', 'unknown'
@@ -72,7 +71,7 @@ def promises(
         settings: Of decisions.
         places: All places, also those that no open door leads to.
     """
-    asked = world_with_charge(world, battery)
+    asked = planning_view(world, battery, settings)
     names = sorted({*world.graph.places, *places} | world.openings.closed.keys())
     energy = energy_of(asked, battery, settings)
     waits: dict[str, float] = {}
@@ -80,7 +79,7 @@ def promises(
     cut, proven = '', False
     by = ''
     if world.fleet is not None:
-        waits = fleet_waits(world, settings, energy)
+        waits = fleet_waits(asked, settings, energy)
         cut, by = 'no robot has it in its share', f' by one of {world.fleet.team(world.now)} robots'
         proven = True
     elif settings.policy == 'tour' and world.place in asked.graph.index:
@@ -129,27 +128,26 @@ def fleet_waits(
     fleet, graph = world.fleet, world.graph
     assert fleet is not None
     waits = fleet.waits(world.now)
-    classes = {place: classes_of(world, place) - {URGENT} for place in fleet.graph.places}
-    rules = [name for name in settings.rules.classes if name != URGENT]
-    rank = {
-        place: min((rules.index(name) for name in found if name in rules), default=len(rules))
-        for place, found in classes.items()
-    }
-    if len(set(rank.values())) < 2 or not waits:
+    places = fleet.graph.places
+    order = settings.priorities.at(world.now, world.openings.zone)
+    table = RuleTable.of(order, places, world.classes, world.threshold_of)
+    if len(set(table.base)) < 2 or not waits:
         return waits
-    is_urgent = URGENT in settings.rules.classes
-    thresholds = {
-        place: world.threshold_of(place) if is_urgent else math.inf for place in fleet.graph.places
+    limits = {
+        place: limit if table.has_urgent else math.inf
+        for place, limit in zip(places, table.limits, strict=True)
     }
     team = fleet.team(world.now)
     tour = fleet.graph.tour.length
-    longest = max((limit for limit in thresholds.values() if math.isfinite(limit)), default=0.0)
+    longest = max((limit for limit in limits.values() if math.isfinite(limit)), default=0.0)
     begin = longest + tour
     if team * len(graph.places) * 3.0 * begin <= MOST_REHEARSED * tour:
-        return _rehearsed(fleet, ruled(classes, thresholds, settings), begin, world.now, energy)
-    first = min(rank.values())
+        return _rehearsed(fleet, ruled(world.classes, limits, settings), begin, world.now, energy)
+    first = min(table.base)
     return {
-        place: wait if rank[place] == first and not is_urgent else thresholds[place] + team * wait
+        place: wait
+        if table.base[fleet.graph.index[place]] == first and not table.has_urgent
+        else limits[place] + team * wait
         for place, wait in waits.items()
     }
 

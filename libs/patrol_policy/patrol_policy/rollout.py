@@ -22,18 +22,13 @@ import numpy as np
 
 from patrol_policy.battery import PERCENTILE_99, Energy
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.rule_table import HALF_OPEN, RuleTable
 from patrol_policy.world import World
 
-URGENT = 'URGENT'
-"""The class whose members change by waiting; all others are taken to stay as they are."""
-NEVER = 9
-"""A rank behind that of every place."""
 NEAR = 8
 """How many nearest places of each place are known."""
 LOCAL_REACH = 200
 """Over how many places a way is searched on a large map before all ways from its start are."""
-HALF_OPEN = 1e-3
-"""Seconds by which a wait must be longer than the threshold, so that rounding does not decide."""
 MOST_MOVES = 6000
 """Moves that one simulation takes at most, whatever the threshold."""
 MOVES_A_PLACE = 4
@@ -47,10 +42,7 @@ class RuleMap:
 
     Args:
         graph: The map.
-        threshold: Seconds after which a place is URGENT.
-        ranks: For each place, the position of its best class in the rules, URGENT left aside.
-        urgent: The position of URGENT in the rules; `NEVER` when it is not among them.
-        own: Thresholds of places that differ, by index; inf: the place never is URGENT.
+        table: The rules.
         energy: What the charge comes to; None: the battery does not matter.
         windows: When places are open that are not always, by index: begin and end of each stretch,
             seconds of the patrol's clock.
@@ -58,8 +50,6 @@ class RuleMap:
 
     Attributes:
         leg_seconds: For each stop, the seconds to each neighbour, exploring included.
-        thresholds: For each place, seconds without a visit after which it is URGENT.
-        overdue_after: The same, so much longer that rounding does not decide.
         wanted: The places that a plan visits: all that the charge allows.
         slack: For each stop, by how much its threshold is above the least one, seconds: so much
             later than others it may be visited. inf: it is not visited at all.
@@ -68,28 +58,22 @@ class RuleMap:
     def __init__(
         self,
         graph: PatrolGraph,
-        threshold: float,
-        ranks: Sequence[int],
-        urgent: int,
-        own: Mapping[int, float] | None = None,
+        table: RuleTable,
         energy: Energy | None = None,
         windows: Mapping[int, Sequence[tuple[float, float]]] | None = None,
         slower: float = 1.0,
     ) -> None:
-        self.graph, self.threshold, self.energy = graph, threshold, energy
+        self.graph, self.table, self.energy = graph, table, energy
         self.windows, self._slower = windows or {}, slower
         self._exits = {place: graph.longest_exit(graph.places[place]) for place in self.windows}
-        self.ranks, self.urgent = list(ranks), urgent
         self.count = count = len(graph.places)
-        own = own or {}
-        self.thresholds = [own.get(place, threshold) for place in range(count)]
-        self.overdue_after = [limit + HALF_OPEN / 2.0 for limit in self.thresholds]
+        limits = table.limits
         within = energy.within_range if energy else [True] * count
         self.wanted = [place for place in range(count) if within[place]]
-        finite = [self.thresholds[p] for p in self.wanted if math.isfinite(self.thresholds[p])]
+        finite = [limits[p] for p in self.wanted if math.isfinite(limits[p])]
         least, most = min(finite, default=0.0), max(finite, default=0.0)
         self.is_even = least == most and len(finite) == len(self.wanted)
-        self.slack = [min(limit, most) - least for limit in self.thresholds]
+        self.slack = [min(limit, most) - least for limit in limits]
         for place in set(range(count)) - set(self.wanted):
             self.slack[place] = math.inf
         stations = energy.stations if energy else []
@@ -235,28 +219,22 @@ class RuleMap:
         gates = []
         for place in range(self.count):
             ways = self.leg_seconds[place]
-            held = bool(ways) and all(self._held(place, other) for other in ways)
+            held = bool(ways) and all(
+                self.table.is_held(place, self.leg_seconds[gate]) for gate in ways
+            )
             gates.append(min(ways, key=lambda o: self.leg_seconds[o][place]) if held else -1)
         return gates
-
-    def _held(self, place: int, gate: int) -> bool:
-        """Whether a neighbour of the gate comes before the place as long as that is not URGENT."""
-        rank = self.ranks[place]
-        return self.urgent < rank and any(
-            self.ranks[other] < rank for other in self.leg_seconds[gate]
-        )
 
     @cached_property
     def held_periods(self) -> dict[int, float]:
         """Seconds that each place waits at least that may be entered only when it is URGENT: for
         its threshold and the leg to it. A place with a station may be entered for a charge."""
         stations = self.energy.stations if self.energy else ()
+        limits = self.table.limits
         return {
-            place: self.thresholds[place] + self.leg_seconds[self.gates[place]][place] + HALF_OPEN
+            place: limits[place] + self.leg_seconds[self.gates[place]][place] + HALF_OPEN
             for place in self.wanted
-            if self.gates[place] >= 0
-            and place not in stations
-            and math.isfinite(self.thresholds[place])
+            if self.gates[place] >= 0 and place not in stations and math.isfinite(limits[place])
         }
 
     @cached_property
@@ -285,9 +263,7 @@ class RuleMap:
 
     def allowed(self, state: State) -> list[int]:
         """Return the neighbours that the rules allow; empty: there are none at all."""
-        seen, ranks, urgent, overdue = state.seen, self.ranks, self.urgent, self.overdue_after
         now = state.now
-        best, found = NEVER + 1, []
         ways: Iterable[int] = self.leg_seconds[state.place]
         if self.energy:
             within = self.energy.within_range
@@ -296,17 +272,13 @@ class RuleMap:
             legs = self.leg_seconds[state.place]
             ways = [o for o in ways if o not in self.windows or self.is_open(o, now, legs[o])]
         if state.avoided:
-            # Last, as in `Rules.candidates`: they count when none of the others may be entered.
+            # Last, as in `decision.candidates`: they count when no other may be entered.
             ways = [other for other in ways if other not in state.avoided] or ways
-        for other in ways:
-            rank = ranks[other]
-            if rank > urgent and now - seen[other] > overdue[other]:
-                rank = urgent
-            if rank < best:
-                best, found = rank, [other]
-            elif rank == best:
-                found.append(other)
-        return found
+        return self.table.first(ways, now, state.due or self.due(state))
+
+    def due(self, state: State) -> list[float]:
+        """Return when each place ranks as URGENT; see `State`."""
+        return state.due or self.table.due_times(state.now, state.seen)
 
     # Hours.
 
@@ -444,6 +416,8 @@ class State:
         avoided: Places that could not be reached lately: they count only when no other is open.
         position: How far the robot is on the course that it follows.
         level: Of the charge, percent.
+        due: When each place ranks as URGENT, see `RuleTable.due_times`; empty: as its last visit
+            says.
     """
 
     place: int
@@ -453,10 +427,12 @@ class State:
     avoided: frozenset[int] = frozenset()
     position: int = 0
     level: float = 100.0
+    due: list[float] = field(default_factory=list)
 
     def fresh(self) -> State:
         """Return a copy at the beginning of a course, in which every place can be reached."""
-        return State(self.place, self.now, self.seen.copy(), self.met.copy(), level=self.level)
+        seen, met = self.seen.copy(), self.met.copy()
+        return State(self.place, self.now, seen, met, level=self.level, due=self.due.copy())
 
 
 Choice = Callable[[RuleMap, State], int]
@@ -513,6 +489,8 @@ def roll_out(
         late: Whether there is no time left; asked now and then.
     """
     at = state.fresh()
+    due = at.due = at.due or rules.table.due_times(at.now, at.seen)
+    due_after = rules.table.due_after
     seen, met, slack, places = at.seen, at.met, rules.slack, rules.places
     end = at.now + horizon
     settled = first = 0.0
@@ -536,6 +514,7 @@ def roll_out(
         place = places[choice]
         wait = rules.waited(place, seen[place], arrived) if windows else arrived - seen[place]
         seen[place] = at.now
+        due[place] = at.now + due_after[place]
         waits[place] = max(waits[place], wait)
         gaps.append(wait - slack[place])
         if met[place]:
@@ -561,21 +540,13 @@ def roll_out(
 
 def rule_map(world: World, energy: Energy | None = None) -> RuleMap:
     """Return the map of a world with its rules."""
-    rules, index = world.rules, world.graph.index
-    ranks = []
-    for place in world.graph.places:
-        classes = world.classes.get(place, frozenset()) - {URGENT}
-        positions = [rank for rank, name in enumerate(rules) if name in classes]
-        ranks.append(min(positions, default=len(rules)))
-    urgent = rules.index(URGENT) if URGENT in rules else NEVER
-    own = {index[p]: seconds for p, seconds in world.own_thresholds.items() if p in index}
-    ahead, windows = world.now + world.look_ahead, {}
+    index, ahead, windows = world.graph.index, world.now + world.look_ahead, {}
     for place, stretches in world.openings.windows.items():
         known = tuple(_known_until(stretches, ahead))
         if place in index and any(world.now < when <= ahead for pair in known for when in pair):
             windows[index[place]] = known
     slower = 1.0 + PERCENTILE_99 * world.time_spread
-    return RuleMap(world.graph, world.threshold, ranks, urgent, own, energy, windows, slower)
+    return RuleMap(world.graph, world.table, energy, windows, slower)
 
 
 def _known_until(

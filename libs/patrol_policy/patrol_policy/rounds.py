@@ -111,6 +111,9 @@ class RoundSearch:
         }
         # What is held for longer is skipped until it is due, which is no breach.
         self._resting = rules.held_periods.keys() - periods
+        within = rules.energy.within_range if rules.energy else [True] * rules.count
+        # The neighbours that a robot at each place may go to, as far as the charge allows it.
+        self._onward = [[o for o in ways if within[o]] for ways in rules.leg_seconds[: rules.count]]
         self._period = max(periods.values(), default=0.0)
         fills = self._period > lap
         self._heat = FILLING_HEAT if fills else HEAT
@@ -170,7 +173,7 @@ class RoundSearch:
             wait = self._longest_wait(walk, times, length)
         # More breaches than these cost more than the limit: the count may stop there.
         most = (limit - wait) / max(self._penalty, 1e-9)
-        breaches = self._breaches(walk, ends, times, length, most)
+        breaches = self._breaches(walk, ends, times, most)
         return Round(targets, length, wait, tuple(breaches), short)
 
     def _walked(self, targets: tuple[int, ...]) -> tuple[list[int], list[int]]:
@@ -246,40 +249,17 @@ class RoundSearch:
         return longest
 
     def _breaches(
-        self, walk: list[int], ends: list[int], times: list[float], length: float, most: float
+        self, walk: list[int], ends: list[int], times: list[float], most: float
     ) -> list[Breach]:
         """Return the steps of a walk that the rules forbid; more than ``most``: not all of them."""
-        if not walk:
-            return []
-        rules = self._rules
-        legs, ranks, urgent, places = rules.leg_seconds, rules.ranks, rules.urgent, rules.places
-        overdue, count = rules.overdue_after, rules.count
-        within, resting = rules.energy.within_range if rules.energy else None, self._resting
-        # When each place was visited last, for the first step: in the round before.
-        seen = {places[stop]: then - length for stop, then in zip(walk, times, strict=True)}
-        breaches, now, place = list[Breach](), 0.0, places[walk[-1]]
-        seen[place] = 0.0
-        for step, (stop, then) in enumerate(zip(walk, times, strict=True)):
-            if stop >= count:
-                place, now = places[stop], then
-                seen[place] = then
-                continue
-            rank = ranks[stop]
-            if rank > urgent and (now - seen[stop] > overdue[stop] or stop in resting):
-                rank = urgent
-            if rank:
-                for instead in legs[place]:
-                    if within and not within[instead]:
-                        continue
-                    if ranks[instead] < rank or (
-                        urgent < rank and now - seen.get(instead, now) > overdue[instead]
-                    ):
-                        breaches.append(Breach(bisect_right(ends, step), instead))
-                        break
+        breaches = list[Breach]()
+        if walk:
+            rules = self._rules
+            broken = rules.table.broken(walk, times, rules.places, self._onward, self._resting)
+            for step, instead in broken:
+                breaches.append(Breach(bisect_right(ends, step), instead))
                 if len(breaches) > most:
                     break
-            seen[stop] = now = then
-            place = stop
         return breaches
 
     @property

@@ -11,11 +11,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 
 from patrol_policy.battery import Battery, BatteryLimits, ChargeCurve, Draw
-from patrol_policy.decision import QUIET, RECHARGE, URGENT, DecisionSettings, Rules, decide
+from patrol_policy.decision import QUIET, RECHARGE, DecisionSettings, decide
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import NO_CALENDAR, Calendar
 from patrol_policy.plan import Plan
-from patrol_policy.rollout import HALF_OPEN
+from patrol_policy.rule_table import Priorities
 from patrol_policy.world import Decision, PolicyMemory, World
 
 CORRIDOR, ROOM = 'CORRIDOR', 'ROOM'
@@ -71,8 +71,8 @@ class Patrol:
     """A robot on a map.
 
     Args:
-        graph: The map; a place with two ways or more is a CORRIDOR.
-        rules: Which places may be chosen.
+        graph: The map.
+        priorities: Which places may be chosen.
         policy: Name of the policy.
         threshold: Seconds after which a place is URGENT.
         station: Where the robot starts and charges.
@@ -81,10 +81,11 @@ class Patrol:
         calendar: The hours of the places.
         stations: Where it can charge; default: where it starts.
         began: When it starts, seconds since 1970.
+        classes: Of each place; default: all are ROOMs, those with two ways or more CORRIDORs, too.
     """
 
     graph: PatrolGraph
-    rules: Rules
+    priorities: Priorities
     policy: str
     threshold: float
     station: str
@@ -94,6 +95,7 @@ class Patrol:
     calendar: Calendar = NO_CALENDAR
     stations: tuple[str, ...] = ()
     began: float = 0.0
+    classes: Mapping[str, frozenset[str]] = field(default_factory=dict)
     generator: random.Random = field(default_factory=lambda: random.Random(1))
 
     def __post_init__(self) -> None:
@@ -104,7 +106,7 @@ class Patrol:
         self.visited_at = dict.fromkeys(self.graph.places, self.began)
         self._memory = PolicyMemory(self.generator)
         self.settings = DecisionSettings(
-            self.rules,
+            self.priorities,
             self.policy,
             self.threshold,
             self.stations or (self.station,),
@@ -112,7 +114,7 @@ class Patrol:
         )
         self._seen: set[str] = set()
         self.run = PatrolRun()
-        self._classes = {
+        self.classes = self.classes or {
             place: frozenset((ROOM, CORRIDOR) if len(ways) > 1 else (ROOM,))
             for place, ways in self.graph.leg_seconds.items()
         }
@@ -120,23 +122,16 @@ class Patrol:
 
     def world(self) -> World:
         """Return what the robot knows now."""
-        reachable = tuple(sorted(self.graph.leg_seconds[self.place]))
-        urgent = {
-            place: self._classes[place] | {URGENT}
-            for place in reachable
-            if self.now - self.visited_at[place]
-            > self.own_thresholds.get(place, self.threshold) + HALF_OPEN / 2.0
-        }
         return World(
             place=self.place,
             now=self.now,
-            reachable=reachable,
-            classes={**self._classes, **urgent},
+            reachable=tuple(sorted(self.graph.leg_seconds[self.place])),
+            classes=self.classes,
             visited_at=self.visited_at,
             graph=self.graph,
             threshold=self.threshold,
             target=self.target,
-            rules=self.rules.classes,
+            priorities=self.priorities,
             own_thresholds=self.own_thresholds,
             since=self.began,
             openings=self.calendar.at(self.now),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import random
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +18,7 @@ from patrol_policy.fleet.assignment import FleetOutlook, Share
 from patrol_policy.fleet.docks import DockSlot
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import ALWAYS_OPEN, Openings
+from patrol_policy.rule_table import ALERT, JOINED, URGENT, Priorities, RuleTable
 
 ROUNDS_AHEAD = 3.0
 """A plan knows the hours for so many times what entering each place once takes."""
@@ -36,6 +38,7 @@ class PolicyMemory:
     plan: Any = None
     energy: dict[Any, Energy] = field(default_factory=dict)
     _part: tuple[Any, PatrolGraph] | None = field(default=None, init=False, repr=False)
+    _table: tuple[Any, Any, RuleTable] | None = field(default=None, init=False, repr=False)
     _asked: PolicyMemory | None = field(default=None, init=False, repr=False)
 
     def without(self, graph: PatrolGraph, gone: frozenset[str], place: str) -> PatrolGraph:
@@ -48,6 +51,17 @@ class PolicyMemory:
             rest = graph.restricted(set(graph.places) - key[1])
             self._part = (key, rest.connected(place))
         return self._part[1]
+
+    def table_of(self, situation: World, order: tuple[str, ...]) -> RuleTable:
+        """Return the rules of a situation as a table; the same one as long as nothing changes."""
+        places, optional = situation.graph.places, situation.openings.optional
+        key = (order, places, situation.threshold, situation.own_thresholds, optional)
+        kept = self._table
+        # Whether the classes are alike takes as long to find out as the table.
+        if kept is None or kept[0] is not situation.classes or kept[1] != key:
+            table = RuleTable.of(order, places, situation.classes, situation.threshold_of)
+            kept = self._table = (situation.classes, key, table)
+        return kept[2]
 
     def for_a_question(self) -> PolicyMemory:
         """Return a copy to answer a question with, which changes nothing of the next choice.
@@ -68,7 +82,10 @@ class World:
         place: Where it is.
         now: Seconds on the mission's clock.
         reachable: The places it can reach from here in one move, as the ontology says.
-        classes: The ontology's classes of the places, e.g. ``{'C1': {'CORRIDOR', 'ROOM'}}``.
+        classes: The ontology's classes of the places, e.g. ``{'C1': {'CORRIDOR', 'ROOM'}}``;
+            whether a place is URGENT stands in ``said``.
+        said: Whether the ontology holds a place URGENT; of a place that is missing it said nothing,
+            and its wait decides.
         visited_at: When each place was visited last, seconds; a place that is missing was never
             visited and counts as visited at ``since``.
         graph: The map, with the time that each leg is expected to take.
@@ -79,7 +96,7 @@ class World:
         own_thresholds: The same for places that differ, seconds; inf: the place never is URGENT.
         level: Of the charge, percent; 100 while it is not known.
         avoided: Places that could not be reached lately.
-        rules: The classes of places by priority that the ontology was asked for.
+        priorities: The classes of places by falling priority; `decide` puts its settings' here.
         requested: Where an operator has sent the robot; empty: nowhere.
         openings: What the hours of the places come to now.
         contradiction: Which facts of the ontology clash, as a sentence; empty: none do.
@@ -100,7 +117,8 @@ class World:
     own_thresholds: Mapping[str, float] = field(default_factory=dict)
     level: float = 100.0
     avoided: frozenset[str] = frozenset()
-    rules: tuple[str, ...] = ()
+    said: Mapping[str, bool] = field(default_factory=dict)
+    priorities: Priorities = field(default_factory=lambda: Priorities(()))
     requested: str = ''
     openings: Openings = ALWAYS_OPEN
     contradiction: str = ''
@@ -118,8 +136,53 @@ class World:
         return f'last visit {self.unvisited(place):.1f} s ago'
 
     def threshold_of(self, place: str) -> float:
-        """Return the seconds after which a place is URGENT."""
+        """Return the seconds after which a place is URGENT; inf: never by waiting.
+
+        Nobody waits for a place that only may be visited now.
+        """
+        if place in self.openings.optional:
+            return math.inf
         return self.own_thresholds.get(place, self.threshold)
+
+    def said_of(self, place: str) -> bool | None:
+        """Return whether the ontology holds a place URGENT; None: it said nothing.
+
+        Where a place only may be visited now, that counts of an ALERT alone.
+        """
+        word = self.said.get(place)
+        if word and place in self.openings.optional and ALERT not in self.classes.get(place, ()):
+            word = False
+        return word
+
+    @cached_property
+    def table(self) -> RuleTable:
+        """The rules, for the places of the graph in its order."""
+        return self.memory.table_of(self, self.priorities.at(self.now, self.openings.zone))
+
+    def is_urgent(self, place: str) -> bool:
+        """Return whether a place of the map is URGENT."""
+        index = self.graph.index[place]
+        return self.table.time_left(index, self.unvisited(place), self.said_of(place)) < 0.0
+
+    def is_in(self, place: str, kind: str) -> bool:
+        """Return whether a place of the map is of a class, or of all that an entry names."""
+        classes = self.classes.get(place, ())
+        return all(
+            self.is_urgent(place) if name == URGENT else name in classes
+            for name in kind.split(JOINED)
+        )
+
+    def first_of(self, places: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+        """Return the class of the rules whose turn it is, and its members among some places of the
+        map, sorted."""
+        table, index = self.table, self.graph.index
+        due = {}
+        for name in places:
+            place = index[name]
+            due[place] = table.turns_in(place, self.unvisited(name), self.said_of(name))
+        found = table.first(due, 0.0, due)
+        rule = table.name_of(table.rank_from(found[0], due[found[0]]))
+        return rule, tuple(sorted([self.graph.places[place] for place in found]))
 
     @property
     def look_ahead(self) -> float:

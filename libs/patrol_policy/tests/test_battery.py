@@ -17,14 +17,15 @@ from patrol_policy.battery import (
     Station,
     way_home,
 )
-from patrol_policy.bounds import charge_bound, default_ranks
-from patrol_policy.decision import RECHARGE, Rules
+from patrol_policy.bounds import charge_bound
+from patrol_policy.decision import RECHARGE
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.promises import LATER, NEVER, WITHIN, promises, summary
 from patrol_policy.rollout import RuleMap
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
 
-from .worlds import seven_rooms
+from .worlds import default_ranks, rule_map_of, seven_rooms
 
 
 def test_what_must_be_left_is_what_driving_home_takes() -> None:
@@ -186,7 +187,7 @@ def patrolled(
     """Return a patrol that lasted for some laps; reach and charge are in tours."""
     tour = graph.tour.length
     battery = SimulatedBattery(100.0 / (reach * tour), 100.0 / (charge * tour))
-    patrol = Patrol(graph, Rules(), 'tour', factor * tour, graph.places[0], battery)
+    patrol = Patrol(graph, Priorities(), 'tour', factor * tour, graph.places[0], battery)
     patrol.level = battery.limits.stop_recharge
     for _ in patrol.until(laps * tour):
         pass
@@ -196,7 +197,7 @@ def patrolled(
 @pytest.mark.parametrize(('reach', 'stop'), [(1260.0, 300.0), (1980.0, 300.0), (660.0, 120.0)])
 def test_a_short_range_leaves_no_room_unvisited(reach: float, stop: float) -> None:
     graph = seven_rooms(stop)
-    patrol = Patrol(graph, Rules(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / reach, 0.2))
+    patrol = Patrol(graph, Priorities(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / reach, 0.2))
     for _ in patrol.until(4 * 3600.0):
         pass
     assert set(patrol.run.waits) == set(graph.places)
@@ -238,7 +239,8 @@ def shortest_lawful_wait(rules: RuleMap, most: int) -> float:
                 if stop < rules.count:
                     ways = rules.leg_seconds[place]
                     ranked = {
-                        o: 0 if now - seen[o] > rules.threshold else rules.ranks[o] for o in ways
+                        o: 0 if now - seen[o] > rules.table.limits[o] else rules.table.base[o]
+                        for o in ways
                     }
                     lawful = lap == 0 or ranked[stop] == min(ranked.values())
                     now += ways[stop]
@@ -284,7 +286,7 @@ def test_the_bound_is_that_of_trying_all_walks(
     graph = PatrolGraph(legs, 6.0)
     station = Station('A', ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits())
-    rules = RuleMap(graph, factor * graph.tour.length, ranks, 0, energy=energy)
+    rules = rule_map_of(graph, factor * graph.tour.length, ranks, 0, energy=energy)
     bound = charge_bound(rules)
     shortest = shortest_lawful_wait(rules, 6)
     assert bound.low <= shortest + 0.01
@@ -296,7 +298,7 @@ def test_a_station_in_a_dead_end_is_entered_by_a_charge_before_it_is_urgent() ->
     graph = PatrolGraph(legs, 6.0)
     station = Station('A', ChargeCurve.even(4.0))
     energy = Energy(graph, [station], Draw(0.2), 0.0, BatteryLimits())
-    rules = RuleMap(graph, 5.0 * graph.tour.length, default_ranks(graph), 0, energy=energy)
+    rules = rule_map_of(graph, 5.0 * graph.tour.length, default_ranks(graph), 0, energy=energy)
     # D waits for its threshold, A does not: the robot charges there.
     assert list(rules.held_periods) == [graph.index['D']]
 
@@ -319,7 +321,7 @@ def test_what_is_promised_is_what_comes() -> None:
 
 def test_it_says_beforehand_which_place_is_never_visited_and_what_would_help() -> None:
     graph = seven_rooms(300.0)
-    patrol = Patrol(graph, Rules(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / 860.0, 1.0))
+    patrol = Patrol(graph, Priorities(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / 860.0, 1.0))
     told = {
         each.place: each
         for each in promises(patrol.world(), patrol.known_battery(), patrol.settings)

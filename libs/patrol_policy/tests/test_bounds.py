@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patrol_policy.bounds import Covers, RuleBound, default_ranks, rule_bound, simple_bound
+from patrol_policy.bounds import Covers, RuleBound, default_table, rule_bound, simple_bound
 from patrol_policy.graph import PatrolGraph
 
 from .test_plan import chain
 from .test_round_search import one_way
-from .worlds import graphs
+from .worlds import default_ranks, graphs, table_of
 
 
 def walks(graph: PatrolGraph, most: int) -> Iterator[list[int]]:
@@ -72,13 +72,14 @@ def test_the_bound_is_the_least_wait_of_all_lawful_walks(
         ranks = ranks[: len(graph.places)]
     known = ranks or default_ranks(graph)
     least = min(lawful_wait(graph, walk, threshold, known) for walk in walks(graph, 9))
-    bound = rule_bound(graph, threshold, ranks)
+    table = table_of(known, threshold)
+    bound = rule_bound(graph, table)
     assert bound.low <= least + 0.01
-    assert bound.low >= simple_bound(graph, threshold, ranks) - 1e-6
+    assert bound.low >= simple_bound(graph, table) - 1e-6
     if math.isfinite(least):
         assert bound.high <= least * 1.011 + 0.01
     assert bound.within(0.011)
-    assert rule_bound(graph, threshold, ranks, states=0).low <= bound.low
+    assert rule_bound(graph, table, states=0).low <= bound.low
 
 
 def test_bounds_are_near_each_other_as_far_as_is_asked() -> None:
@@ -86,7 +87,7 @@ def test_bounds_are_near_each_other_as_far_as_is_asked() -> None:
     assert not RuleBound(100.0).within(10.0)
     assert RuleBound(100.0, 101.0).within(0.01)
     assert not RuleBound(100.0, 101.1).within(0.01)
-    assert default_ranks(chain(3)) == [2, 1, 2]
+    assert default_table(chain(3), 9.0).base == [2, 1, 2]
 
 
 @settings(max_examples=60)

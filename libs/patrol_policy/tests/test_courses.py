@@ -12,24 +12,24 @@ import pytest
 
 from patrol_policy import plan as plan_module
 from patrol_policy.battery import WORTH_CHARGING, BatteryLimits, ChargeCurve, Draw, Energy, Station
-from patrol_policy.bounds import default_ranks
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import Openings
 from patrol_policy.plan import Course, Plan, plan_of
 from patrol_policy.rollout import HALF_OPEN, Outcome, RuleMap, State
 from patrol_policy.rounds import Round
+from patrol_policy.rule_table import Priorities
 from patrol_policy.world import PolicyMemory, World
 
 from .test_plan import chain
 from .test_round_search import one_way
-from .worlds import seven_rooms
+from .worlds import default_ranks, rule_map_of, said_in, seven_rooms
 
 CHAIN = chain(4)
 """P0 to P3 in a row, 7 s each; the ends are entered from P1 and P2, when they are URGENT only."""
 
 
 def ruled(threshold: float = 50.0, **more: Any) -> RuleMap:
-    return RuleMap(CHAIN, threshold, default_ranks(CHAIN), 0, **more)
+    return rule_map_of(CHAIN, threshold, default_ranks(CHAIN), 0, **more)
 
 
 def state(place: int, *idle: float, position: int = 0, **more: Any) -> State:
@@ -75,7 +75,7 @@ def test_a_target_that_may_not_be_entered_yet_is_waited_for_with_patience_only()
 
 
 def test_a_target_that_was_visited_lately_is_skipped() -> None:
-    rules = RuleMap(CHAIN, 50.0, [1] * 4, 9)
+    rules = rule_map_of(CHAIN, 50.0, [1] * 4, 9)
     for skip, expected in ((6.0, (2, 0)), (6.01, (0, 1))):
         at = state(1, 30.0, 0.0, 6.0, 40.0)
         assert chosen(Course((2, 0), skip=skip), rules, at) == expected
@@ -88,11 +88,11 @@ def test_a_target_that_was_visited_lately_is_skipped() -> None:
 
 
 def test_the_way_to_a_target_leads_over_what_may_be_entered() -> None:
-    rules = RuleMap(CHAIN, 50.0, [1] * 4, 9)
+    rules = rule_map_of(CHAIN, 50.0, [1] * 4, 9)
     assert chosen(Course((3, 0)), rules, state(0, 0.0, 9.0, 9.0, 9.0)) == (1, 0)
     star = PatrolGraph({'M': dict.fromkeys('ABC', 5.0), **{name: {'M': 5.0} for name in 'ABC'}})
     # B is URGENT, A is the target, C is nearer to nothing: the one that waited longest.
-    held = RuleMap(star, 50.0, [2, 2, 2, 1], 0)
+    held = rule_map_of(star, 50.0, [2, 2, 2, 1], 0)
     assert held.allowed(state(3, 10.0, 60.0, 55.0, 0.0)) == [1, 2]
     course = Course((0,), patience=math.inf)
     assert chosen(course, held, state(3, 10.0, 60.0, 55.0, 0.0))[0] == 1
@@ -107,7 +107,7 @@ def test_a_target_with_hours_is_gone_to_while_it_is_open_and_can_be_left_again(
     """P3 is open for 100 s; from P1 the way takes 14 s, and it takes 5 s to drive out again."""
 
     def goes(opens: float) -> bool:
-        rules = RuleMap(
+        rules = rule_map_of(
             CHAIN, 50.0, [1] * 4, 9, windows={3: ((1000.0 + opens, 1100.0 + opens),)}, slower=slower
         )
         at = state(1, 9.0, 0.0, 9.0, 60.0)
@@ -126,7 +126,7 @@ def charged(reach: float = 300.0) -> RuleMap:
         CHAIN, [Station('P0', ChargeCurve.even(2.0))], Draw(90.0 / reach), 0.0,
         BatteryLimits(0.0, 90.0, 5.0),
     )  # fmt: skip
-    return RuleMap(CHAIN, 50.0, [1] * 4, 9, energy=energy)
+    return rule_map_of(CHAIN, 50.0, [1] * 4, 9, energy=energy)
 
 
 def test_a_charge_is_skipped_where_it_would_give_little() -> None:
@@ -172,9 +172,10 @@ def known(graph: PatrolGraph, threshold: float = 50.0, **more: Any) -> World:
         'visited_at': dict.fromkeys(graph.places, 1000.0),
         'graph': graph,
         'threshold': threshold,
-        'rules': ('URGENT', 'CORRIDOR', 'ROOM'),
+        'priorities': Priorities(('URGENT', 'CORRIDOR', 'ROOM')),
         **more,
     }
+    values.setdefault('said', said_in(values['classes']) if more.get('classes') else {})
     return World(**values)
 
 
@@ -196,7 +197,7 @@ def test_a_round_is_begun_with_any_target_and_with_patience_for_what_it_lacks() 
 def test_a_round_is_begun_first_where_the_first_waits_are_shortest(seed: int) -> None:
     draw, graph = random.Random(seed), one_way(seed, 9)
     seen = {place: 1000.0 - draw.uniform(0.0, 100.0) for place in graph.places}
-    plan = planned(known(graph, math.inf, visited_at=seen, rules=(), place='P4'))
+    plan = planned(known(graph, math.inf, visited_at=seen, priorities=Priorities(()), place='P4'))
     targets = tuple(draw.sample(range(9), 9))
     away, index = plan.rules.away, graph.index
 
@@ -259,7 +260,7 @@ def test_a_plan_is_for_one_map_and_keeps_while_times_differ_little() -> None:
     assert plan.fits(world, None)
     assert not plan.fits(replace(world, threshold=61.0), None)
     assert not plan.fits(replace(world, own_thresholds={}), None)
-    assert not plan.fits(replace(world, rules=('ROOM',)), None)
+    assert not plan.fits(replace(world, priorities=Priorities(('ROOM',))), None)
     assert plan.fits(replace(world, now=1000.0 - HALF_OPEN), None)
     assert not plan.fits(replace(world, now=1000.0 - 2.0 * HALF_OPEN), None)
 
@@ -318,11 +319,11 @@ def test_a_question_changes_nothing_of_what_comes() -> None:
     world = known(seven_rooms(), 60.0)
     plan = planned(world)
     asked = plan.for_a_question()
-    before = replace(plan._state, met=plan._state.met.copy())
+    before = replace(plan.state, met=plan.state.met.copy())
     for place in ('C1', 'R1'):
         asked.advance(replace(world, place=place, now=1010.0))
-    assert plan._state == before
-    assert asked._state != before
+    assert plan.state == before
+    assert asked.state != before
 
 
 def test_what_the_search_was_cut_off_by_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -345,19 +346,19 @@ def test_what_was_noticed_counts_as_overdue() -> None:
     world = known(seven_rooms(), 60.0, classes=classes, visited_at=seen, since=950.0)
     plan = planned(world)
     index = plan.rules.graph.index
-    state = plan._state
-    # R1 was visited lately: as if it were just past its threshold. R2 is long past it.
-    assert state.seen[index['R1']] == 1000.0 - 60.0 - HALF_OPEN
-    assert state.seen[index['R2']] == 900.0
-    assert state.seen[index['R3']] == 990.0
+    state = plan.state
+    # R1 was visited lately, R2 long ago: as the ontology says, both are URGENT now.
+    late = {place for place in plan.rules.graph.places if state.due[index[place]] < 1000.0}
+    assert late == {'R1', 'R2'}
+    assert state.seen[index['R1']] == state.seen[index['R3']] == 990.0
     endless = planned(replace(world, own_thresholds={'R1': math.inf}))
-    assert endless._state.seen[index['R1']] == 1000.0 - 60.0 - HALF_OPEN
+    assert endless.state.due[index['R1']] < 1000.0
     never = planned(replace(world, visited_at={}))
-    assert never._state.seen[index['R3']] == 950.0
+    assert never.state.seen[index['R3']] == 950.0
     assert list(itertools.compress(plan.rules.graph.places, state.met)) == []
     plan.advance(replace(world, place='R3', now=1005.0, avoided=frozenset({'R4', 'R9'})))
-    assert list(itertools.compress(plan.rules.graph.places, plan._state.met)) == ['R3']
-    assert plan._state.avoided == {index['R4']}
+    assert list(itertools.compress(plan.rules.graph.places, plan.state.met)) == ['R3']
+    assert plan.state.avoided == {index['R4']}
 
 
 def test_ways_into_a_round_are_tried_with_other_patience_and_with_places_left_out() -> None:

@@ -11,7 +11,7 @@ from patrol_policy.battery import Battery, Draw
 from patrol_policy.decision import (
     DecisionSettings,
     NowhereToGoError,
-    Rules,
+    candidates,
     decide,
     tour_warning,
     why_charge,
@@ -21,19 +21,20 @@ from patrol_policy.fleet import FleetOutlook, FleetRobot
 from patrol_policy.hours import ALWAYS_OPEN, Openings
 from patrol_policy.plan import plan_of
 from patrol_policy.policies import POLICIES
+from patrol_policy.rule_table import Priorities
 from patrol_policy.world import PolicyMemory
 
 from .worlds import seven_rooms, world
 
 
-def chosen(rules: Rules, policy: str, **changes: object) -> tuple[str, str]:
+def chosen(rules: Priorities, policy: str, **changes: object) -> tuple[str, str]:
     settings = DecisionSettings(rules, policy)
     decision = decide(world(**changes), Battery(), settings)
     return decision.place, decision.rule
 
 
 def test_urgent_places_come_before_corridors() -> None:
-    assert chosen(Rules(), 'oldest') == ('R2', 'URGENT')
+    assert chosen(Priorities(), 'oldest') == ('R2', 'URGENT')
 
 
 @pytest.mark.parametrize('hours', [ALWAYS_OPEN, Openings({}, frozenset({'E'}), {})])
@@ -42,26 +43,26 @@ def test_an_alert_is_urgent_at_once_whatever_its_threshold_and_hours(hours: Open
     noticed = calm | {'E': frozenset({'ROOM', 'ALERT', 'URGENT'})}
     longer = {'own_thresholds': {'E': 86_400.0}, 'openings': hours}
     for policy in POLICIES:
-        assert chosen(Rules(), policy, classes=noticed, **longer) == ('E', 'URGENT')
+        assert chosen(Priorities(), policy, classes=noticed, **longer) == ('E', 'URGENT')
     asked = world(classes=noticed, **longer)
     assert 'R1 is URGENT: missing' in why_not('R1', asked, Battery(), DecisionSettings()).premises
 
 
 def test_a_place_that_only_may_be_visited_is_not_urgent() -> None:
     hours = Openings({}, frozenset({'R2'}), {})
-    assert chosen(Rules(), 'oldest', openings=hours) == ('R1', 'URGENT')
+    assert chosen(Priorities(), 'oldest', openings=hours) == ('R1', 'URGENT')
 
 
 def test_corridors_come_before_rooms() -> None:
     calm = {place: frozenset({'ROOM'}) for place in ('R1', 'R2')}
     calm |= {place: frozenset({'CORRIDOR', 'ROOM'}) for place in ('C2', 'E')}
-    assert chosen(Rules(), 'oldest', classes=calm) == ('C2', 'CORRIDOR')
+    assert chosen(Priorities(), 'oldest', classes=calm) == ('C2', 'CORRIDOR')
 
 
 def test_the_rules_are_data() -> None:
-    assert chosen(Rules(('CORRIDOR', 'URGENT')), 'oldest') == ('C2', 'CORRIDOR')
-    assert chosen(Rules(()), 'oldest') == ('R2', 'any')
-    assert chosen(Rules(('KITCHEN',)), 'oldest') == ('R2', 'any')
+    assert chosen(Priorities(('CORRIDOR', 'URGENT')), 'oldest') == ('C2', 'CORRIDOR')
+    assert chosen(Priorities(()), 'oldest') == ('R2', 'any')
+    assert chosen(Priorities(('KITCHEN',)), 'oldest') == ('R2', 'any')
 
 
 @pytest.mark.parametrize(
@@ -70,19 +71,19 @@ def test_the_rules_are_data() -> None:
 )
 def test_bad_rules_are_named(names: tuple[str, ...], problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
-        Rules(names)
+        Priorities(names)
 
 
 def test_among_equals_the_longest_unvisited_then_the_first_name() -> None:
     always = dict.fromkeys(('E', 'R1', 'R2', 'C2'), 1.0)
-    assert chosen(Rules(()), 'oldest', visited_at=always) == ('C2', 'any')
+    assert chosen(Priorities(()), 'oldest', visited_at=always) == ('C2', 'any')
 
 
 def test_avoided_places_wait_until_nothing_else_is_left() -> None:
-    assert chosen(Rules(), 'oldest', avoided=frozenset({'R2'})) == ('R1', 'URGENT')
-    assert chosen(Rules(), 'oldest', avoided=frozenset({'R1', 'R2'}))[1] == 'CORRIDOR'
+    assert chosen(Priorities(), 'oldest', avoided=frozenset({'R2'})) == ('R1', 'URGENT')
+    assert chosen(Priorities(), 'oldest', avoided=frozenset({'R1', 'R2'}))[1] == 'CORRIDOR'
     everything = frozenset({'R1', 'R2', 'C2', 'E'})
-    assert chosen(Rules(), 'oldest', avoided=everything) == ('R2', 'URGENT')
+    assert chosen(Priorities(), 'oldest', avoided=everything) == ('R2', 'URGENT')
 
 
 def test_a_plan_takes_a_place_that_could_not_be_reached_where_the_others_are_closed() -> None:
@@ -96,14 +97,14 @@ def test_a_plan_takes_a_place_that_could_not_be_reached_where_the_others_are_clo
             windows=dict.fromkeys(('C2', 'E', 'R2'), ((130.0, 9000.0),)),
         ),
     )
-    assert Rules().candidates(asked) == ('URGENT', ('R1',))
+    assert candidates(replace(asked, priorities=Priorities())) == ('URGENT', ('R1',))
     plan = plan_of(asked)
     assert asked.graph.places[plan.advance(asked)[0]] == 'R1'
 
 
 def test_nothing_within_reach_is_an_error_that_says_so() -> None:
     with pytest.raises(NowhereToGoError, match='nothing can be reached from C1'):
-        chosen(Rules(), 'oldest', reachable=())
+        chosen(Priorities(), 'oldest', reachable=())
 
 
 def test_a_decision_carries_its_reason_in_words_and_numbers() -> None:
@@ -214,7 +215,7 @@ def test_a_threshold_below_the_tour_is_warned_of() -> None:
 def test_a_question_changes_no_decision(policy: str) -> None:
     def decisions(*, asked: bool) -> list[str]:
         graph, memory, settings = seven_rooms(), PolicyMemory(random.Random(3)), DecisionSettings()
-        settings.policy, settings.rules = policy, Rules(())
+        settings.policy, settings.priorities = policy, Priorities(())
         place, now, visited_at, taken = 'C1', 100.0, {'C1': 100.0}, []
         for _ in range(8):
             here = world(
@@ -246,4 +247,4 @@ def test_questions_before_the_first_choice_share_one_plan() -> None:
     planned = memory.for_a_question().plan
     assert planned is not None
     assert memory.plan is None
-    assert planned.fits(here, None)
+    assert planned.fits(replace(here, priorities=Priorities()), None)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patrol_policy.battery import Battery
-from patrol_policy.decision import DecisionSettings, Rules, decide
+from patrol_policy.decision import DecisionSettings, decide
 from patrol_policy.fleet import (
     ChargeNeed,
     FleetError,
@@ -31,6 +31,7 @@ from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, Outage
 from patrol_policy.graph import PatrolGraph, graph_of_places
 from patrol_policy.hours import Openings
 from patrol_policy.promises import promises
+from patrol_policy.rule_table import Priorities
 from patrol_policy.world import World
 
 from .worlds import seven_rooms, world
@@ -390,7 +391,7 @@ def fleet_world(robots: list[FleetRobot], **changes: object) -> World:
 
 
 def test_promises_count_all_robots_and_their_charging() -> None:
-    settings = DecisionSettings(rules=Rules(()))
+    settings = DecisionSettings(priorities=Priorities(()))
     places = ('E', 'R1', 'R4')
 
     def waits(robots: list[FleetRobot], ratio: float = 0.0) -> set[float]:
@@ -414,7 +415,7 @@ def test_promises_count_all_robots_and_their_charging() -> None:
 
 def test_a_fleets_promise_knows_the_rules() -> None:
     robots = fleet('E', 'R4')
-    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    settings = DecisionSettings(priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')))
     seen = fleet_world(robots)
     found = {each.place: each for each in promises(seen, Battery(), settings)}
     # A room is entered when it is URGENT, not before.
@@ -425,7 +426,7 @@ def test_a_fleets_promise_knows_the_rules() -> None:
     run.until(900.0)
     for place, wait in run.longest_waits(300.0).items():
         assert wait <= 1.1 * found[place].wait
-    never = DecisionSettings(rules=Rules(('CORRIDOR', 'ROOM')))
+    never = DecisionSettings(priorities=Priorities(('CORRIDOR', 'ROOM')))
     found = {each.place: each for each in promises(seen, Battery(), never)}
     assert (found['R1'].verdict, found['C2'].verdict) == ('never', 'within')
 
@@ -443,7 +444,7 @@ def test_with_rules_no_place_waits_for_ever(count: int) -> None:
     classes = {
         place: frozenset({'ROOM', 'CORRIDOR'} if place[0] == 'C' else {'ROOM'}) for place in points
     }
-    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    settings = DecisionSettings(priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')))
     policy = ruled(classes, dict.fromkeys(points, 120.0), settings)
     run = FleetPatrol(graph, {f'robot{n}': 'C1' for n in range(count)}, policy)
     run.until(2000.0)
@@ -457,7 +458,7 @@ def test_what_two_leave_to_each_other_is_visited_when_it_is_overdue() -> None:
         for place, ways in graph.leg_seconds.items()
     }
     tour = graph.tour.length
-    settings = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR', 'ROOM')))
+    settings = DecisionSettings(priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')))
     for count in (3, 6):
         policy = ruled(classes, dict.fromkeys(classes, tour), settings)
         run = FleetPatrol(graph, {f'robot{n}': 'P0' for n in range(count)}, policy)
@@ -466,7 +467,7 @@ def test_what_two_leave_to_each_other_is_visited_when_it_is_overdue() -> None:
 
 
 def test_what_is_overdue_is_driven_to_by_one_robot_alone() -> None:
-    rules = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR')))
+    rules = DecisionSettings(priorities=Priorities(('URGENT', 'CORRIDOR')))
     tour = fleet_plan(seven_rooms(), 1).groups[0].stops
     ways = {'robot1': 'C1', 'robot2': 'C2'}
 
@@ -514,7 +515,7 @@ def test_a_fleet_enters_nothing_that_is_closed_and_passes_over_what_is_for_long(
             visited_at=dict.fromkeys(tour, 1000.0) | dict.fromkeys(('R1', 'R3', 'R4'), 0.0),
             openings=Openings({shut: 'closed'}, frozenset(), {}, opens_in=opens_in),
         )
-        made = decide(seen, Battery(), DecisionSettings(rules=Rules(rules)))
+        made = decide(seen, Battery(), DecisionSettings(priorities=Priorities(rules)))
         assert made.place != shut, (rules, opens_in, here, stop, made.reason)
 
 
@@ -527,7 +528,7 @@ def test_the_way_to_what_is_overdue_leads_through_nothing_that_could_not_be_reac
         now=1000.0,
         visited_at=dict.fromkeys(tour, 1000.0) | {'R4': 0.0},
     )
-    rules = DecisionSettings(rules=Rules(('URGENT', 'CORRIDOR')))
+    rules = DecisionSettings(priorities=Priorities(('URGENT', 'CORRIDOR')))
     first = decide(seen, Battery(), rules)
     assert 'R4 is overdue' in first.reason
     for avoided in ({first.place}, {'R4'}):

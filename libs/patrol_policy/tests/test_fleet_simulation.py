@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from patrol_policy.battery import BatteryLimits, ChargeCurve, Draw, Energy, Station
-from patrol_policy.decision import DecisionSettings, Rules
+from patrol_policy.decision import DecisionSettings
 from patrol_policy.fleet import (
     FleetChoice,
     FleetOutlook,
@@ -25,6 +25,7 @@ from patrol_policy.fleet.docks import DockSlot
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, FleetView, Outage
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.promises import fleet_waits
+from patrol_policy.rule_table import Priorities
 from patrol_policy.tour import tour_length
 from patrol_policy.world import World
 
@@ -246,7 +247,7 @@ def test_a_bound_needs_a_dock_and_times_above_zero() -> None:
         assert large == pytest.approx(small, rel=2e-2)
 
 
-def fleet_world(threshold: float, *places: str, rules: Rules | None = None) -> Any:
+def fleet_world(threshold: float, *places: str, priorities: Priorities | None = None) -> Any:
     """Return the outlook of a fleet on a ring with two rooms behind it, and its settings."""
     legs = {name: dict(ways) for name, ways in ring(6).leg_seconds.items()}
     for room, door in (('R1', 'P00'), ('R2', 'P03')):
@@ -266,12 +267,12 @@ def fleet_world(threshold: float, *places: str, rules: Rules | None = None) -> A
         threshold=threshold,
         fleet=FleetOutlook('robot0', robots, graph),
     )
-    return world, DecisionSettings(rules=rules or Rules())
+    return world, DecisionSettings(priorities=priorities or Priorities())
 
 
 def test_a_fleet_waits_for_what_the_rules_hold_back_until_that_is_urgent() -> None:
     # All that the rules let everybody enter: robots pass at equal distances.
-    world, settings = fleet_world(100.0, 'P00', 'P03', rules=Rules(()))
+    world, settings = fleet_world(100.0, 'P00', 'P03', priorities=Priorities(()))
     tour = world.graph.tour.length
     assert tour == 100.0
     plan = fleet_plan(world.graph, 2)
@@ -283,7 +284,9 @@ def test_a_fleet_waits_for_what_the_rules_hold_back_until_that_is_urgent() -> No
     for place, wait in waits.items():
         assert found[place] == pytest.approx(9000.0 + 2 * wait), place
     # Where nothing is URGENT, corridors come first for ever, and rooms after them never.
-    world, settings = fleet_world(9000.0, *['P00'] * 17, rules=Rules(('CORRIDOR', 'ROOM')))
+    world, settings = fleet_world(
+        9000.0, *['P00'] * 17, priorities=Priorities(('CORRIDOR', 'ROOM'))
+    )
     found = fleet_waits(world, settings)
     assert all(math.isfinite(found[place]) for place in found if place[0] == 'P')
     assert math.isinf(found['R1'])

@@ -7,9 +7,10 @@ from zoneinfo import ZoneInfo
 
 import pytest
 
-from patrol_policy.decision import QUIET, Rules
+from patrol_policy.decision import QUIET
 from patrol_policy.hours import MAY, MUST, NOT, Calendar, WeeklyHours
 from patrol_policy.promises import CLOSED, LATER, WITHIN, lines, promises
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
 
 from .worlds import seven_rooms
@@ -70,7 +71,7 @@ def opened(text: str, stop: float, hour: int, days: float) -> Patrol:
     begin = datetime(2024, 5, 6, hour, 0, tzinfo=ROME).timestamp()
     graph = seven_rooms(stop)
     threshold = 0.9 * graph.tour.length
-    patrol = Patrol(graph, Rules(), 'tour', threshold, 'E', calendar=calendar, began=begin)
+    patrol = Patrol(graph, Priorities(), 'tour', threshold, 'E', calendar=calendar, began=begin)
     for decision in patrol.until(begin + 86_400.0 * days):
         if decision.place == 'R3':
             assert not calendar.at(patrol.now).closed
@@ -106,7 +107,7 @@ def test_a_robot_behind_a_place_that_has_closed_waits_until_it_opens() -> None:
     calendar = Calendar({'C2': WeeklyHours.parse('daily 08:00-18:00')}, zone=ROME)
     begin = datetime(2024, 5, 6, 19, 0, tzinfo=ROME).timestamp()
     graph = seven_rooms(60.0)
-    patrol = Patrol(graph, Rules(), 'tour', 900.0, 'E', calendar=calendar, began=begin)
+    patrol = Patrol(graph, Priorities(), 'tour', 900.0, 'E', calendar=calendar, began=begin)
     patrol.place = 'R4'
     decision = patrol.step()
     assert (decision.rule, decision.place) == (QUIET, 'R4')
@@ -125,7 +126,9 @@ def test_a_simulated_week_keeps_to_the_calendar() -> None:
         zone=ROME,
     )
     begin = datetime(2024, 3, 29, 7, 0, tzinfo=ROME).timestamp()
-    patrol = Patrol(seven_rooms(60.0), Rules(), 'tour', 900.0, 'E', calendar=calendar, began=begin)
+    patrol = Patrol(
+        seven_rooms(60.0), Priorities(), 'tour', 900.0, 'E', calendar=calendar, began=begin
+    )
     visits = []
     for decision in patrol.until(begin + 4 * 86_400.0):
         if decision.rule != QUIET:
@@ -149,7 +152,13 @@ def test_hours_that_are_changed_during_a_patrol_change_the_plan(before: str, aft
 
     def patrol(times: str) -> Patrol:
         return Patrol(
-            seven_rooms(200.0), Rules(), 'tour', 900.0, 'E', calendar=calendar(times), began=begin
+            seven_rooms(200.0),
+            Priorities(),
+            'tour',
+            900.0,
+            'E',
+            calendar=calendar(times),
+            began=begin,
         )
 
     changed = patrol(before)
@@ -169,7 +178,9 @@ def test_what_the_quiet_hours_come_before_is_said_to_end_with_them() -> None:
         quiet=WeeklyHours.parse('daily 22:00-06:00'),
         zone=ROME,
     )
-    patrol = Patrol(seven_rooms(200.0), Rules(), 'tour', 30.0, 'E', calendar=calendar, began=begin)
+    patrol = Patrol(
+        seven_rooms(200.0), Priorities(), 'tour', 30.0, 'E', calendar=calendar, began=begin
+    )
     told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
     words = {each.place: each.words for each in told}
     assert words['R3'] == 'R3: not visited before the quiet hours, which begin in 60 s'

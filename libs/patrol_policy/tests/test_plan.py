@@ -10,13 +10,14 @@ from functools import cache
 import pytest
 
 from patrol_policy.battery import Battery
-from patrol_policy.bounds import RuleBound, rule_bound, simple_bound
-from patrol_policy.decision import DecisionSettings, Rules, decide
+from patrol_policy.bounds import RuleBound, default_table, rule_bound, simple_bound
+from patrol_policy.decision import DecisionSettings, decide
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
 from patrol_policy.world import PolicyMemory, World
 
-from .worlds import seven_rooms
+from .worlds import seven_rooms, table_of
 
 
 def grid(width: int, height: int) -> PatrolGraph:
@@ -69,7 +70,7 @@ LONG_LEG = of_pairs(
 
 
 def settled(graph: PatrolGraph, policy: str, threshold: float) -> float:
-    patrol = Patrol(graph, Rules(), policy, threshold, graph.places[0])
+    patrol = Patrol(graph, Priorities(), policy, threshold, graph.places[0])
     for _ in patrol.until(10.0 * max(graph.tour.length, threshold)):
         pass
     return patrol.run.settled
@@ -111,7 +112,7 @@ def test_a_move_takes_its_leg_even_where_a_way_round_is_shorter() -> None:
     graph = of_pairs({(0, 1): 5.0, (1, 2): 5.0, (0, 2): 50.0})
     assert graph.seconds('P0', 'P2') == 14.0
     assert (graph.move('P0', 'P2'), graph.move('P0', 'P1'), graph.move('P0', 'P0')) == (52, 7, 0)
-    patrol = Patrol(graph, Rules(), 'oldest', 7.0, 'P0')
+    patrol = Patrol(graph, Priorities(), 'oldest', 7.0, 'P0')
     patrol.visited_at['P2'] = -1.0
     assert patrol.step().place == 'P2'
     assert patrol.now == 52.0
@@ -122,7 +123,7 @@ def test_the_first_waits_are_no_worse_than_those_of_simple_policies(name: str) -
     graph = MAPS[name]
     longest = {}
     for policy in ('tour', 'oldest', 'lookahead'):
-        patrol = Patrol(graph, Rules(), policy, 0.75 * graph.tour.length, graph.places[0])
+        patrol = Patrol(graph, Priorities(), policy, 0.75 * graph.tour.length, graph.places[0])
         for _ in patrol.until(5.0 * graph.tour.length):
             pass
         longest[policy] = patrol.run.longest
@@ -147,7 +148,7 @@ def test_the_plan_comes_within_a_twentieth_of_the_bound_that_knows_the_rules(
 ) -> None:
     graph = MAPS[name]
     threshold = factor * graph.tour.length
-    bound = rule_bound(graph, threshold)
+    bound = rule_bound(graph, default_table(graph, threshold))
     assert bound.low <= (least + 1e-3) * graph.tour.length
     assert bound.high == pytest.approx(least * graph.tour.length, rel=0.01)
     assert settled_on(name, 'tour', factor) <= 1.05 * bound.low
@@ -156,7 +157,7 @@ def test_the_plan_comes_within_a_twentieth_of_the_bound_that_knows_the_rules(
 def test_little_more_than_the_round_is_accepted_for_shorter_first_waits() -> None:
     graph = of_pairs({(0, 1): 17.9, (0, 2): 15.4, (0, 3): 19.5, (1, 4): 17.0, (2, 3): 32.4})
     threshold = 2.0 * graph.tour.length
-    bound = rule_bound(graph, threshold).low
+    bound = rule_bound(graph, default_table(graph, threshold)).low
     assert settled(graph, 'tour', threshold) <= 1.03 * bound
 
 
@@ -171,7 +172,7 @@ def test_the_way_into_the_round_that_is_tried_first_leaves_short_first_waits(
         draw = random.Random(seed)
         graph = PatrolGraph(ring(12, draw, 0.6).leg_seconds)
         tour = graph.tour.length
-        patrol = Patrol(graph, Rules(()), 'tour', factor * tour, 'P0')
+        patrol = Patrol(graph, Priorities(()), 'tour', factor * tour, 'P0')
         patrol.visited_at = {place: -draw.uniform(0.0, tour) for place in graph.places}
         patrol.visited_at['P0'] = 0.0
         shortest = math.inf
@@ -194,7 +195,7 @@ def test_the_way_into_the_round_that_is_tried_first_leaves_short_first_waits(
 @pytest.mark.parametrize('seed', [2, 3])
 def test_leg_times_that_are_learned_do_not_turn_the_round(seed: int) -> None:
     draw = random.Random(seed)
-    patrol = Patrol(ring(8, draw, 0.0), Rules(), 'tour', 7.0, 'P0')
+    patrol = Patrol(ring(8, draw, 0.0), Priorities(), 'tour', 7.0, 'P0')
     for _ in range(32):
         patrol.graph = ring(8, draw, 0.2)
         patrol.step()
@@ -214,8 +215,8 @@ DRIVEN = {
 def test_a_long_wait_of_the_first_lap_is_not_promised_for_ever(share: float) -> None:
     """The robot learns on its first lap that legs take other times than it was told."""
     known = {leg: share * seconds for leg, seconds in DRIVEN.items()}
-    patrol = Patrol(of_legs(known), Rules(), 'tour', 240.0, station='E')
-    knowing = Patrol(of_legs(DRIVEN), Rules(), 'tour', 240.0, station='E')
+    patrol = Patrol(of_legs(known), Priorities(), 'tour', 240.0, station='E')
+    knowing = Patrol(of_legs(DRIVEN), Priorities(), 'tour', 240.0, station='E')
     knowing.step()
     promised = []
     for _ in range(30):
@@ -242,7 +243,6 @@ def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() 
         reachable = tuple(sorted(graph.leg_seconds[place]))
         kinds = {
             name: {'ROOM', *(['CORRIDOR'] if len(graph.leg_seconds[name]) > 1 else [])}
-            | ({'URGENT'} if name not in visited_at else set())
             for name in graph.places
         }
         decision = decide(
@@ -254,7 +254,7 @@ def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() 
                 visited_at=dict(visited_at),
                 graph=graph,
                 threshold=240.0,
-                rules=Rules().classes,
+                said={name: name not in visited_at for name in graph.places},
                 memory=memory,
             ),
             Battery(),
@@ -268,16 +268,19 @@ def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() 
 
 def test_a_map_that_is_too_large_has_no_exhaustive_bound() -> None:
     graph = grid(5, 5)
-    assert rule_bound(graph, 100.0) == RuleBound(simple_bound(graph, 100.0))
+    table = default_table(graph, 100.0)
+    assert rule_bound(graph, table) == RuleBound(simple_bound(graph, table))
 
 
 def test_the_simple_bound_knows_the_rules_that_it_is_given() -> None:
     graph = chain(4)
     # Corridors all: the shortest tour.
-    assert simple_bound(graph, 100.0, [1, 1, 1, 1]) == graph.tour.length == 42.0
+    assert simple_bound(graph, table_of([1, 1, 1, 1], 100.0)) == graph.tour.length == 42.0
     # The ends are rooms, which are entered when they are urgent only.
-    assert simple_bound(graph, 100.0) == pytest.approx(107.0, abs=0.1)
-    assert simple_bound(graph, 100.0, [2, 1, 1, 2]) == simple_bound(graph, 100.0)
+    assert simple_bound(graph, default_table(graph, 100.0)) == pytest.approx(107.0, abs=0.1)
+    assert simple_bound(graph, table_of([2, 1, 1, 2], 100.0)) == simple_bound(
+        graph, default_table(graph, 100.0)
+    )
 
 
 def test_costs_may_differ_by_direction() -> None:
@@ -309,7 +312,7 @@ def town(count: int, seed: int) -> PatrolGraph:
 def test_the_plan_of_a_large_map_is_near_the_bound(seed: int) -> None:
     graph = town(50, seed)
     threshold = 2.0 * graph.tour.length
-    patrol = Patrol(graph, Rules(), 'tour', threshold, 'P00')
+    patrol = Patrol(graph, Priorities(), 'tour', threshold, 'P00')
     for _ in patrol.until(10.0 * threshold):
         pass
-    assert patrol.run.settled <= 1.02 * simple_bound(graph, threshold)
+    assert patrol.run.settled <= 1.02 * simple_bound(graph, default_table(graph, threshold))

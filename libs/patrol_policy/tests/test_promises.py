@@ -15,17 +15,15 @@ from patrol_policy.decision import (
     DecisionSettings,
     NowhereToGoError,
     OutOfRangeError,
-    Rules,
-    classes_of,
     decide,
     energy_of,
     is_closed,
+    planning_view,
     stations_within_reach,
     tour_warning,
     why_charge,
     why_closed,
     why_not,
-    world_with_charge,
 )
 from patrol_policy.graph import GraphError, PatrolGraph, graph_of_places
 from patrol_policy.hours import Openings
@@ -41,6 +39,7 @@ from patrol_policy.promises import (
     summary,
     verdicts,
 )
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
 from patrol_policy.world import PolicyMemory
 
@@ -90,30 +89,30 @@ def test_a_promise_says_by_how_much_a_place_is_late() -> None:
     # There and back takes 28 s; the ends are entered when they are URGENT only.
     for rules, threshold, verdict, words in (
         (
-            Rules(()),
+            Priorities(()),
             30.0,
             WITHIN,
             'P0: visited every 28 s at the latest, within its threshold of 30 s',
         ),
         (
-            Rules(()),
+            Priorities(()),
             28.0,
             WITHIN,
             'P0: visited every 28 s at the latest, within its threshold of 28 s',
         ),
         (
-            Rules(()),
+            Priorities(()),
             20.0,
             LATER,
             'P0: visited every 28 s at the latest, 8 s later than its threshold of 20 s',
         ),
-        (Rules(()), math.inf, WITHIN, 'P0: visited every 28 s at the latest'),
+        (Priorities(()), math.inf, WITHIN, 'P0: visited every 28 s at the latest'),
     ):
         told = told_of(Patrol(graph, rules, 'tour', threshold, 'P1'), 'P0')
         assert (told.verdict, told.words, told.threshold) == (verdict, words, threshold)
         assert told.wait == pytest.approx(28.0)
     # A place that never is URGENT is not entered where others always come before it.
-    rules = Rules(('URGENT', 'CORRIDOR', 'ROOM'))
+    rules = Priorities(('URGENT', 'CORRIDOR', 'ROOM'))
     graph = chain(4)
     told = told_of(Patrol(graph, rules, 'tour', 10.0, 'P1', own_thresholds={'P0': math.inf}), 'P0')
     assert told.verdict == UNKNOWN
@@ -176,20 +175,22 @@ def test_a_place_is_entered_if_it_can_be_left_in_time() -> None:
 
 
 def test_classes_follow_own_thresholds_and_hours() -> None:
-    seen = world(own_thresholds={'E': 10.0, 'C2': 20.0, 'R4': 5.0})
+    limits = {'E': 10.0, 'C2': 20.0, 'R4': 5.0}
+    seen = world(own_thresholds=limits, said={'R1': True, 'R2': True}, since=98.0)
     # E was visited 10 s ago, C2 20 s; of R4 no visit is known.
-    assert 'URGENT' not in classes_of(seen, 'E')
-    assert 'URGENT' not in classes_of(seen, 'R4')
+    assert not seen.is_urgent('E')
+    assert not seen.is_urgent('R4')
     later = replace(seen, now=100.1)
-    assert 'URGENT' in classes_of(later, 'E')
-    assert 'URGENT' in classes_of(later, 'C2')
+    assert later.is_urgent('E')
+    assert later.is_urgent('C2')
     optional = replace(later, openings=Openings({}, frozenset({'E', 'R1'}), {}))
-    assert 'URGENT' not in classes_of(optional, 'E')
-    assert 'URGENT' not in classes_of(optional, 'R1')
-    charged = world_with_charge(optional, Battery(40.0))
+    assert not optional.is_urgent('E')
+    assert not optional.is_urgent('R1')
+    charged = planning_view(optional, Battery(40.0), DecisionSettings())
     assert charged.level == 40.0
-    assert charged.own_thresholds == {'E': math.inf, 'C2': 20.0, 'R4': 5.0, 'R1': math.inf}
-    assert world_with_charge(seen, Battery()).level == 100.0
+    found = {place: charged.threshold_of(place) for place in ('E', 'C2', 'R4', 'R1')}
+    assert found == {'E': math.inf, 'C2': 20.0, 'R4': 5.0, 'R1': math.inf}
+    assert planning_view(seen, Battery(), DecisionSettings()).level == 100.0
 
 
 def test_what_opens_within_the_time_that_a_plan_knows_stays_on_the_map() -> None:
@@ -197,7 +198,8 @@ def test_what_opens_within_the_time_that_a_plan_knows_stays_on_the_map() -> None
     ahead = seen.look_ahead
     for opens, kept in ((ahead, True), (ahead + 1.0, False)):
         shut = Openings({'R4': 'closed', 'R9': 'closed'}, frozenset(), {}, opens_in={'R4': opens})
-        graph = world_with_charge(replace(seen, openings=shut), Battery()).graph
+        known = replace(seen, openings=shut)
+        graph = planning_view(known, Battery(), DecisionSettings()).graph
         assert ('R4' in graph.index) == kept
     memory = PolicyMemory()
     one = memory.without(seen.graph, frozenset({'R4', 'C1'}), 'C1')
@@ -255,7 +257,7 @@ def test_a_robot_charges_below_what_the_way_home_takes_and_never_above_full() ->
 
 
 def test_where_a_full_charge_suffices_for_no_place_the_robot_stays() -> None:
-    settings = DecisionSettings(rules=Rules(()), battery=BatteryLimits(0, 90, 5))
+    settings = DecisionSettings(priorities=Priorities(()), battery=BatteryLimits(0, 90, 5))
     graph = seven_rooms(60.0)
     seen = world(place='E', reachable=('C1', 'C2'), graph=graph, level=90.0)
     decision = decide(seen, Battery(90.0, draw=Draw(1.5)), settings)
@@ -269,7 +271,9 @@ def test_where_a_full_charge_suffices_for_no_place_the_robot_stays() -> None:
 
 
 def test_a_robot_goes_to_charge_before_a_place_that_it_could_not_come_home_from() -> None:
-    settings = DecisionSettings(rules=Rules(()), policy='oldest', battery=BatteryLimits(0, 90, 5))
+    settings = DecisionSettings(
+        priorities=Priorities(()), policy='oldest', battery=BatteryLimits(0, 90, 5)
+    )
     graph = seven_rooms(10.0)
     seen = world(place='C1', graph=graph, visited_at={'C1': 100.0, 'C2': 0.0, 'E': 90.0})
     way, home = graph.move('C1', 'C2'), math.dist((10, 14), (5, 10))
@@ -290,7 +294,10 @@ def test_a_place_beside_the_robot_that_is_not_entered_says_why() -> None:
     avoided = replace(world(), avoided=frozenset({'R1'}))
     told = why_not('R1', avoided, Battery(), DecisionSettings(policy='oldest'))
     assert told.sentence.startswith('R1 could not be reached lately and is avoided for now; ')
-    one = replace(world(), classes={'R2': frozenset({'URGENT'})})
+    one = world(
+        classes={'R2': frozenset({'URGENT'})},
+        said=dict.fromkeys(world().graph.places, False) | {'R2': True},
+    )
     told = why_not('E', one, Battery(), DecisionSettings(policy='oldest'))
     assert 'E is not URGENT (last visit 10.0 s ago, threshold 60 s), but R2 is; ' in told.sentence
     decision = decide(one, Battery(), DecisionSettings(policy='oldest'))
@@ -325,7 +332,7 @@ def test_bad_maps_are_named_and_points_may_be_driven_at_any_speed() -> None:
 
 def test_a_simulated_patrol_counts_waits_charges_and_an_empty_battery() -> None:
     graph = chain(2)
-    patrol = Patrol(graph, Rules(()), 'oldest', 10.0, 'P0')
+    patrol = Patrol(graph, Priorities(()), 'oldest', 10.0, 'P0')
     for _ in patrol.until(70.0):
         pass
     run = patrol.run
@@ -334,13 +341,18 @@ def test_a_simulated_patrol_counts_waits_charges_and_an_empty_battery() -> None:
     assert run.mean == pytest.approx(7.0, abs=0.5)
     assert run.rules == {'any': 10}
     empty = SimulatedBattery(10.0, 5.0, BatteryLimits(0, 90, 0), keeps_reserve=False)
-    patrol = Patrol(graph, Rules(()), 'oldest', 10.0, 'P0', empty)
+    patrol = Patrol(graph, Priorities(()), 'oldest', 10.0, 'P0', empty)
     for _ in patrol.until(70.0):
         pass
     assert patrol.run.strandings > 0
     assert patrol.level >= 0.0
     careful = Patrol(
-        graph, Rules(()), 'oldest', 10.0, 'P0', SimulatedBattery(2.0, 5.0, BatteryLimits(20, 90, 5))
+        graph,
+        Priorities(()),
+        'oldest',
+        10.0,
+        'P0',
+        SimulatedBattery(2.0, 5.0, BatteryLimits(20, 90, 5)),
     )
     for _ in range(12):
         careful.step()

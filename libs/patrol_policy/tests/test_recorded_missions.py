@@ -10,7 +10,7 @@ from __future__ import annotations
 import pytest
 
 from patrol_policy import plan as plan_module
-from patrol_policy.decision import Rules
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
 
 from .test_plan import EQUAL_LEGS, LONG_LEG, chain, grid, town
@@ -24,18 +24,23 @@ def patrols() -> dict[str, Patrol]:
     tour = rooms.tour.length
     station = SimulatedBattery(draw=0.35, charge=1.5)
     return {
-        'rooms': Patrol(rooms, Rules(), 'tour', 0.75 * tour, 'E'),
+        'rooms': Patrol(rooms, Priorities(), 'tour', 0.75 * tour, 'E'),
         'own': Patrol(
-            rooms, Rules(), 'tour', tour, 'E', own_thresholds={'R3': 0.4 * tour, 'C1': 0.5 * tour}
+            rooms,
+            Priorities(),
+            'tour',
+            tour,
+            'E',
+            own_thresholds={'R3': 0.4 * tour, 'C1': 0.5 * tour},
         ),
-        'any': Patrol(one_way(5, 11), Rules(()), 'tour', 40.0, 'P0'),
-        'held': Patrol(chain(6), Rules(), 'tour', 2.0 * chain(6).tour.length, 'P0'),
-        'equal': Patrol(EQUAL_LEGS, Rules(), 'tour', EQUAL_LEGS.tour.length, 'P0'),
-        'long': Patrol(LONG_LEG, Rules(), 'tour', 0.5 * LONG_LEG.tour.length, 'P0'),
-        'grid': Patrol(grid(4, 4), Rules(), 'tour', 0.6 * grid(4, 4).tour.length, 'P00'),
-        'town': Patrol(town(20, 5), Rules(), 'tour', 0.5 * town(20, 5).tour.length, 'P00'),
-        'charging': Patrol(rooms, Rules(), 'tour', tour, 'E', station),
-        'charging town': Patrol(town(14, 3), Rules(), 'tour', 200.0, 'P00', station),
+        'any': Patrol(one_way(5, 11), Priorities(()), 'tour', 40.0, 'P0'),
+        'held': Patrol(chain(6), Priorities(), 'tour', 2.0 * chain(6).tour.length, 'P0'),
+        'equal': Patrol(EQUAL_LEGS, Priorities(), 'tour', EQUAL_LEGS.tour.length, 'P0'),
+        'long': Patrol(LONG_LEG, Priorities(), 'tour', 0.5 * LONG_LEG.tour.length, 'P0'),
+        'grid': Patrol(grid(4, 4), Priorities(), 'tour', 0.6 * grid(4, 4).tour.length, 'P00'),
+        'town': Patrol(town(20, 5), Priorities(), 'tour', 0.5 * town(20, 5).tour.length, 'P00'),
+        'charging': Patrol(rooms, Priorities(), 'tour', tour, 'E', station),
+        'charging town': Patrol(town(14, 3), Priorities(), 'tour', 200.0, 'P00', station),
     }
 
 

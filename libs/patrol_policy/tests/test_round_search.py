@@ -20,13 +20,12 @@ from patrol_policy.battery import (
     Energy,
     Station,
 )
-from patrol_policy.bounds import default_ranks
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.rollout import RuleMap
 from patrol_policy.rounds import Breach, Round, RoundChanges, RoundSearch, filled, with_charges
 
 from .test_plan import grid
-from .worlds import graphs
+from .worlds import default_ranks, graphs, rule_map_of
 
 
 @st.composite
@@ -56,7 +55,7 @@ def rule_maps(
             BatteryLimits(0.0, 90.0, 5.0),
         )
     urgent = draw(st.sampled_from([0, 0, 2, 9]))
-    return RuleMap(graph, threshold, ranks, urgent, own, energy)
+    return rule_map_of(graph, threshold, ranks, urgent, own, energy)
 
 
 def search_of(rules: RuleMap, targets: tuple[int, ...]) -> RoundSearch:
@@ -85,9 +84,8 @@ def judged_by_walking(
         longest, breaches, short, begun = 0.0, [], 0.0, now
 
         def rank(other: int) -> float:
-            overdue = now - seen[other] > rules.thresholds[other] + 5e-4  # noqa: B023
-            urgent = rules.urgent < rules.ranks[other] and overdue
-            return rules.urgent if urgent else rules.ranks[other]
+            overdue = now - seen[other] > rules.table.limits[other] + 5e-4  # noqa: B023
+            return (rules.table.urgent if overdue else rules.table.base)[other]
 
         for stop, number in stops:
             at = rules.places[stop]
@@ -101,9 +99,7 @@ def judged_by_walking(
                 now += drive + energy.charge_seconds(stop - count, max(level, 0.0))
                 level = energy.full
             else:
-                own = min(rank(at), rules.urgent if at in resting else math.inf)
-                if rules.ranks[at] <= rules.urgent:
-                    own = rules.ranks[at]
+                own = min(rank(at), rules.table.urgent[at] if at in resting else math.inf)
                 for other in rules.leg_seconds[place]:
                     if energy and not energy.within_range[other]:
                         continue
@@ -168,7 +164,7 @@ def test_a_round_with_charges_is_judged_as_by_driving_it(
 
 def test_a_round_costs_its_wait_and_more_for_what_is_forbidden_and_for_no_charge() -> None:
     graph = grid(3, 3)
-    rules = RuleMap(graph, 10.0, default_ranks(graph), 0)
+    rules = rule_map_of(graph, 10.0, default_ranks(graph), 0)
     search = search_of(rules, graph.tour.order)
     plain = Round(graph.tour.order, 70.0, 70.0)
     leg = rules.mean_leg
@@ -177,7 +173,7 @@ def test_a_round_costs_its_wait_and_more_for_what_is_forbidden_and_for_no_charge
     assert search.cost(Round((), 70.0, 70.0, (breach, breach))) == pytest.approx(70.0 + 8.0 * leg)
     assert search.cost(Round((), 70.0, 70.0, (), leg)) == pytest.approx(70.0 + 24.0 * leg)
     # Nobody can visit a held place sooner than it is due: a shorter round is no better.
-    ends = RuleMap(graph, 200.0, [*[2] * 4, 1, *[2] * 4], 0)
+    ends = rule_map_of(graph, 200.0, [*[2] * 4, 1, *[2] * 4], 0)
     assert search_of(ends, graph.tour.order).cost(plain) == ends.least_wait > 200.0
 
 
@@ -224,7 +220,7 @@ def one_way(seed: int, count: int) -> PatrolGraph:
 
 def test_how_long_a_changed_round_will_be_is_known_before_it_is_made() -> None:
     graph = one_way(1, 9)
-    rules = RuleMap(graph, 100.0, [1] * 9, 0)
+    rules = rule_map_of(graph, 100.0, [1] * 9, 0)
     found = search_of(rules, tuple(range(9))).judged((0, 4, 2, 3, 1, 5, 8, 7, 6))
     assert not found.breaches
     kinds, made = lengths_known_beforehand(rules, found, 'one', range(300))
@@ -244,7 +240,7 @@ def test_how_long_a_changed_round_will_be_is_known_before_it_is_made() -> None:
 
 def test_a_place_that_the_rules_demand_is_taken_along() -> None:
     graph = one_way(2, 9)
-    rules = RuleMap(graph, 200.0, [1 + number % 3 for number in range(9)], 0)
+    rules = rule_map_of(graph, 200.0, [1 + number % 3 for number in range(9)], 0)
     found = search_of(rules, tuple(range(9))).judged(tuple(range(9)))
     assert found.breaches
     _, made = lengths_known_beforehand(rules, found, 'one', range(200))
@@ -266,7 +262,7 @@ def test_a_place_that_the_rules_demand_is_taken_along() -> None:
 
 def test_a_visit_that_is_made_twice_is_left_out_again() -> None:
     graph = one_way(3, 6)
-    rules = RuleMap(graph, 100.0, [1] * 6, 0)
+    rules = rule_map_of(graph, 100.0, [1] * 6, 0)
     twice = (0, 1, 2, 0, 3, 4, 2, 5)
     found = search_of(rules, twice).judged(twice)
     fewer = set()
@@ -287,7 +283,7 @@ def with_stations(reach: float) -> RuleMap:
         0.0,
         BatteryLimits(0.0, 90.0, 5.0),
     )
-    return RuleMap(graph, 50.0, [1] * 7, 0, energy=energy)
+    return rule_map_of(graph, 50.0, [1] * 7, 0, energy=energy)
 
 
 def test_charges_are_added_moved_and_left_out_but_for_the_last() -> None:
@@ -331,7 +327,7 @@ def test_a_round_is_filled_by_further_laps_until_it_is_long_enough(
     draw = random.Random(seed)
     graph = one_way(seed, max(count, 4))
     count = len(graph.places)
-    rules = RuleMap(graph, 100.0, [draw.choice((1, 1, 2)) for _ in range(count)], 0)
+    rules = rule_map_of(graph, 100.0, [draw.choice((1, 1, 2)) for _ in range(count)], 0)
     targets = tuple(draw.sample(range(count), count))
     period = factor * rules.length(targets)
     made = filled(rules, targets, period)
@@ -366,7 +362,7 @@ def test_charges_are_put_only_where_the_charge_would_not_last(
 ) -> None:
     station = Station(graph.places[0], ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits(0.0, 90.0, 5.0))
-    rules = RuleMap(graph, 50.0, default_ranks(graph), 0, energy=energy)
+    rules = rule_map_of(graph, 50.0, default_ranks(graph), 0, energy=energy)
     if len(rules.wanted) < 2:
         return
     targets = tuple(random.Random(seed).sample(rules.wanted, len(rules.wanted)))
@@ -399,7 +395,7 @@ def test_the_search_begins_with_the_best_of_each_group_and_is_finished_when_none
     None
 ):
     graph = grid(3, 3)
-    rules = RuleMap(graph, 500.0, [1] * 9, 0)
+    rules = rule_map_of(graph, 500.0, [1] * 9, 0)
     tour, worse = graph.tour.order, tuple(range(9))
     search = RoundSearch(rules, [[worse, tour], [worse]], graph.tour.length)
     assert search.begun == search.best
@@ -419,7 +415,7 @@ def test_the_search_begins_with_the_best_of_each_group_and_is_finished_when_none
 
 
 def test_a_round_of_one_place_takes_no_time() -> None:
-    rules = RuleMap(one_way(1, 5), 50.0, [1] * 5, 0)
+    rules = rule_map_of(one_way(1, 5), 50.0, [1] * 5, 0)
     assert search_of(rules, (0, 1, 2, 3, 4)).judged((3,)) == Round((3,), 0.0, 0.0, (), 0.0)
     charged = with_stations(300.0)
     alone = search_of(charged, (7, 0, 1, 2, 3, 4, 5, 6)).judged((3,))
@@ -452,7 +448,7 @@ def test_a_round_is_judged_in_part_only_where_it_costs_more_than_the_limit(
 
 def test_work_is_counted_by_steps_and_tries() -> None:
     graph = one_way(3, 6)
-    rules = RuleMap(graph, 100.0, [1] * 6, 0)
+    rules = rule_map_of(graph, 100.0, [1] * 6, 0)
     search = search_of(rules, (0, 3, 1, 4, 2, 5))
     steps = sum(len(rules.path(a, b)) for a, b in itertools.pairwise((5, 0, 3, 1, 4, 2, 5)))
     assert search.work == pytest.approx(0.35 * steps)
@@ -466,7 +462,7 @@ def test_work_is_counted_by_steps_and_tries() -> None:
 
 def test_a_search_ends_where_nothing_can_be_better() -> None:
     graph = one_way(3, 6)
-    even = RuleMap(graph, 100.0, [1] * 6, 0)
+    even = rule_map_of(graph, 100.0, [1] * 6, 0)
     tour = graph.tour
     search = search_of(even, tour.order)
     assert search.finished, 'the shortest tour'

@@ -6,20 +6,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patrol_policy.bounds import default_ranks, rule_bound
-from patrol_policy.decision import Rules
+from patrol_policy.bounds import default_table, rule_bound
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.plan import Plan
 from patrol_policy.rollout import RuleMap, State, lookahead, oldest, roll_out
 from patrol_policy.rounds import RoundSearch
+from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
 
 from .test_plan import chain, grid
-from .worlds import graphs, seven_rooms
+from .worlds import default_ranks, graphs, rule_map_of, seven_rooms
 
 
 def rules_of(graph: PatrolGraph, threshold: float) -> RuleMap:
-    return RuleMap(graph, threshold, default_ranks(graph), 0)
+    return rule_map_of(graph, threshold, default_ranks(graph), 0)
 
 
 def searched(rules: RuleMap, work: float) -> RoundSearch:
@@ -50,7 +50,7 @@ def test_a_round_is_filled_where_the_robot_would_wait_for_a_room() -> None:
     assert not search.best.breaches
     # Hardly longer than it must be.
     assert rules.least_period <= search.best.length <= 1.05 * rules.least_period
-    patrol = Patrol(graph, Rules(), 'tour', graph.tour.length, 'A')
+    patrol = Patrol(graph, Priorities(), 'tour', graph.tour.length, 'A')
     for _ in patrol.until(20.0 * graph.tour.length):
         pass
     assert patrol.run.settled <= search.best.length + 1e-6
@@ -71,7 +71,7 @@ def test_a_round_visits_every_place_in_its_length(graph: PatrolGraph, factor: fl
 def test_a_policy_followed_ahead_does_what_it_does_in_a_patrol(kind: str, factor: float) -> None:
     graph = seven_rooms()
     threshold = factor * graph.tour.length
-    patrol = Patrol(graph, Rules(), kind, threshold, graph.places[0])
+    patrol = Patrol(graph, Priorities(), kind, threshold, graph.places[0])
     for _ in patrol.until(60.0 * graph.tour.length):
         pass
     rules = rules_of(graph, threshold)
@@ -85,7 +85,7 @@ def test_a_policy_followed_ahead_does_what_it_does_in_a_patrol(kind: str, factor
 def test_a_plan_keeps_what_it_promises(factor: float) -> None:
     graph = chain(6)
     threshold = factor * graph.tour.length
-    patrol = Patrol(graph, Rules(), 'tour', threshold, graph.places[0])
+    patrol = Patrol(graph, Priorities(), 'tour', threshold, graph.places[0])
     promised = Plan(patrol.world()).longest
     for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
         pass
@@ -98,10 +98,13 @@ def test_nobody_goes_below_the_bound_that_knows_the_rules(
     graph: PatrolGraph, factor: float, policy: str
 ) -> None:
     threshold = factor * graph.tour.length
-    patrol = Patrol(graph, Rules(), policy, threshold, graph.places[0])
+    patrol = Patrol(graph, Priorities(), policy, threshold, graph.places[0])
     for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
         pass
-    assert patrol.run.settled >= rule_bound(graph, threshold, states=3_000).low - 0.01
+    assert (
+        patrol.run.settled
+        >= rule_bound(graph, default_table(graph, threshold), states=3_000).low - 0.01
+    )
 
 
 def test_a_large_map_has_the_same_ways_as_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,7 +147,7 @@ def test_the_wait_of_a_place_with_more_time_counts_less() -> None:
     graph = chain(3)
     for own in ({0: 20.0}, {2: 20.0}):
         # All others have 80 s more.
-        rules = RuleMap(graph, 100.0, default_ranks(graph), 0, own)
+        rules = rule_map_of(graph, 100.0, default_ranks(graph), 0, own)
         search = RoundSearch(rules, [[(0, 1, 2, 1)]], graph.tour.length)
         found = search.judged((0, 1, 2, 1))
         assert found.length == pytest.approx(4 * 7.0) == found.wait

@@ -12,12 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patrol_policy.battery import BatteryLimits, ChargeCurve, Draw, Energy, Station
-from patrol_policy.bounds import default_ranks
-from patrol_policy.decision import NowhereToGoError, Rules
+from patrol_policy.decision import NowhereToGoError, candidates
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import Openings
 from patrol_policy.rollout import (
-    NEVER,
     Choice,
     RuleMap,
     State,
@@ -26,17 +24,18 @@ from patrol_policy.rollout import (
     roll_out,
     rule_map,
 )
+from patrol_policy.rule_table import Priorities
 from patrol_policy.world import World
 
 from .test_plan import chain
 from .test_tours import hall
-from .worlds import graphs, seven_rooms, world
+from .worlds import default_ranks, graphs, rule_map_of, seven_rooms, world
 
 
 def open_at(*stretches: tuple[float, float], slower: float = 1.0) -> RuleMap:
     """Return a chain of three places, 5 s of driving and 2 s of exploring each, one with hours."""
     graph = chain(3)
-    return RuleMap(graph, 100.0, default_ranks(graph), 0, windows={2: stretches}, slower=slower)
+    return rule_map_of(graph, 100.0, default_ranks(graph), 0, windows={2: stretches}, slower=slower)
 
 
 def test_a_way_is_begun_to_what_is_open_and_can_be_left_in_time() -> None:
@@ -102,7 +101,7 @@ def test_the_laps_of_a_walk_are_its_shortest_stretches_with_all_places(
     graph: PatrolGraph, seed: int
 ) -> None:
     draw = random.Random(seed)
-    rules = RuleMap(graph, 100.0, default_ranks(graph), 0)
+    rules = rule_map_of(graph, 100.0, default_ranks(graph), 0)
     count = rules.count
     walk = draw.choices(range(count), k=draw.randint(1, 4 * count))
     expected = []
@@ -123,15 +122,15 @@ def test_ways_on_a_large_map_are_those_of_a_small_one(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = hall(5, 4, seed)
-    small = RuleMap(graph, 100.0, default_ranks(graph), 0)
+    small = rule_map_of(graph, 100.0, default_ranks(graph), 0)
     energy = Energy(graph, [Station('P0000')], Draw(0.1), 0.0, BatteryLimits())
-    charged = RuleMap(graph, 100.0, default_ranks(graph), 0, energy=energy)
+    charged = rule_map_of(graph, 100.0, default_ranks(graph), 0, energy=energy)
     for reach in (200, 3):
         monkeypatch.setattr('patrol_policy.graph.ALL_PAIRS_UP_TO', 5)
         monkeypatch.setattr('patrol_policy.rollout.LOCAL_REACH', reach)
         other = PatrolGraph(graph.leg_seconds, graph.exploration_seconds)
         energy = Energy(other, [Station('P0000')], Draw(0.1), 0.0, BatteryLimits())
-        large = RuleMap(other, 100.0, default_ranks(other), 0, energy=energy)
+        large = rule_map_of(other, 100.0, default_ranks(other), 0, energy=energy)
         for stop, target in itertools.product(range(21), repeat=2):
             assert large.away[stop][target] == pytest.approx(charged.away[stop][target])
         assert small.path(7, 7) == large.path(7, 7) == []
@@ -178,7 +177,7 @@ def worlds_of_rules(draw: st.DrawFn) -> World:
         threshold=threshold,
         own_thresholds=own,
         avoided=frozenset(draw(st.sets(st.sampled_from(graph.places), max_size=2))),
-        rules=rules,
+        priorities=Priorities(rules),
         openings=Openings(
             dict.fromkeys(closed, 'closed'),
             frozenset(),
@@ -202,7 +201,7 @@ def test_a_plan_may_enter_what_the_rules_allow(known: World) -> None:
     rules = rule_map(known)
     places = [rules.graph.places[place] for place in rules.allowed(state_of(rules, known))]
     try:
-        _, allowed = Rules(known.rules).candidates(known)
+        _, allowed = candidates(known)
     except NowhereToGoError:
         allowed = ()
     assert sorted(places) == list(allowed)
@@ -239,15 +238,19 @@ def test_the_rules_of_a_world_become_ranks() -> None:
         'R1': frozenset({'ROOM', 'URGENT'}),
         'R2': frozenset({'CELLAR'}),
     }
-    asked = world(classes=classes, rules=('URGENT', 'CORRIDOR', 'ROOM'), own_thresholds={'R1': 9.0})
+    asked = world(
+        classes=classes,
+        priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')),
+        own_thresholds={'R1': 9.0},
+    )
     rules = rule_map(asked)
     index = asked.graph.index
-    assert [rules.ranks[index[place]] for place in ('C1', 'R1', 'R2', 'E')] == [1, 2, 3, 3]
-    assert rules.urgent == 0
-    assert [rules.thresholds[index[place]] for place in ('C1', 'R1')] == [60.0, 9.0]
-    assert rule_map(replace(asked, rules=('ROOM',))).urgent == NEVER
+    assert [rules.table.base[index[place]] for place in ('C1', 'R1', 'R2', 'E')] == [1, 2, 3, 3]
+    assert set(rules.table.urgent) == {0}
+    assert [rules.table.limits[index[place]] for place in ('C1', 'R1')] == [60.0, 9.0]
+    assert not rule_map(replace(asked, priorities=Priorities(('ROOM',)))).table.has_urgent
     # Nothing is URGENT then, whatever waits.
-    assert rule_map(replace(asked, rules=('ROOM',))).held_periods == {}
+    assert rule_map(replace(asked, priorities=Priorities(('ROOM',)))).held_periods == {}
 
 
 def test_what_opens_after_the_time_that_a_plan_knows_is_not_known() -> None:
@@ -280,7 +283,7 @@ def charged(reach: float = 200.0, stations: tuple[str, ...] = ('E',)) -> RuleMap
         0.0,
         BatteryLimits(0.0, 90.0, 5.0),
     )
-    return RuleMap(graph, 60.0, default_ranks(graph), 0, energy=energy)
+    return rule_map_of(graph, 60.0, default_ranks(graph), 0, energy=energy)
 
 
 def test_a_move_takes_time_and_charge_and_a_charge_gives_it_back() -> None:
@@ -329,24 +332,24 @@ def test_a_robot_goes_where_it_comes_home_from_else_it_charges() -> None:
     far = charged(reach=20.0)
     assert far.guarded(stuck, index['R2']) == index['E']
     assert far.guarded(replace(stuck, level=89.0), index['R2']) == 7
-    without = RuleMap(rules.graph, 60.0, default_ranks(rules.graph), 0)
+    without = rule_map_of(rules.graph, 60.0, default_ranks(rules.graph), 0)
     assert without.charge_from(0) == -1
     assert without.affords(low, goal)
 
 
 def test_slack_is_how_much_later_than_others_a_place_may_be_visited() -> None:
     graph = chain(4)
-    plain = RuleMap(graph, 50.0, default_ranks(graph), 0)
+    plain = rule_map_of(graph, 50.0, default_ranks(graph), 0)
     assert (plain.is_even, plain.slack) == (True, [0.0] * 4)
-    own = RuleMap(graph, 50.0, default_ranks(graph), 0, {1: 80.0, 2: math.inf, 3: 20.0})
+    own = rule_map_of(graph, 50.0, default_ranks(graph), 0, {1: 80.0, 2: math.inf, 3: 20.0})
     assert not own.is_even
     # What never is URGENT waits as long as the longest of the others.
     assert own.slack == [30.0, 60.0, 60.0, 0.0]
-    never = RuleMap(graph, math.inf, default_ranks(graph), 0)
+    never = rule_map_of(graph, math.inf, default_ranks(graph), 0)
     assert (never.is_even, never.slack) == (False, [0.0] * 4)
     # Out of reach of the charge.
     far = Energy(graph, [Station('P0')], Draw(2.5), 0.0, BatteryLimits(0.0, 90.0, 5.0))
-    reached = RuleMap(graph, 50.0, default_ranks(graph), 0, energy=far)
+    reached = rule_map_of(graph, 50.0, default_ranks(graph), 0, energy=far)
     assert reached.wanted == [0, 1, 2]
     assert reached.slack == [0.0, 0.0, 0.0, math.inf, 0.0]
     assert reached.is_even
@@ -354,21 +357,21 @@ def test_slack_is_how_much_later_than_others_a_place_may_be_visited() -> None:
 
 def test_ends_of_corridors_are_held_until_they_are_urgent() -> None:
     graph = chain(4)
-    rules = RuleMap(graph, 50.0, default_ranks(graph), 0, {3: math.inf})
+    rules = rule_map_of(graph, 50.0, default_ranks(graph), 0, {3: math.inf})
     assert rules.gates == [1, -1, -1, 2]
     assert rules.held_periods == {0: pytest.approx(57.0, abs=0.01)}
     assert rules.least_period == pytest.approx(57.0, abs=0.01)
     assert rules.mean_leg == 7.0
     # Where URGENT does not come before the others, nothing is held for it.
-    assert RuleMap(graph, 50.0, default_ranks(graph), 9).gates == [-1] * 4
-    assert RuleMap(graph, 50.0, [2, 1, 1, 1], 0).gates == [1, -1, -1, -1]
-    assert RuleMap(graph, 50.0, [1, 1, 1, 1], 0).gates == [-1] * 4
-    even = RuleMap(graph, 50.0, [1, 1, 1, 1], 0)
+    assert rule_map_of(graph, 50.0, default_ranks(graph), None).gates == [-1] * 4
+    assert rule_map_of(graph, 50.0, [2, 1, 1, 1], 0).gates == [1, -1, -1, -1]
+    assert rule_map_of(graph, 50.0, [1, 1, 1, 1], 0).gates == [-1] * 4
+    even = rule_map_of(graph, 50.0, [1, 1, 1, 1], 0)
     assert (even.least_period, even.least_wait, even.least_round) == (0.0, 0.0, graph.tour.length)
-    held = RuleMap(graph, 50.0, default_ranks(graph), 0)
+    held = rule_map_of(graph, 50.0, default_ranks(graph), 0)
     assert held.least_round == held.least_period == held.least_wait
     # The place with the longest period has more time.
-    later = RuleMap(graph, 50.0, default_ranks(graph), 0, {0: 70.0})
+    later = rule_map_of(graph, 50.0, default_ranks(graph), 0, {0: 70.0})
     assert later.least_period == pytest.approx(77.0, abs=0.01)
     assert later.least_wait == pytest.approx(57.0, abs=0.01)
 
@@ -388,7 +391,7 @@ def patrolled_maps(draw: st.DrawFn) -> tuple[RuleMap, State]:
     count = len(graph.places)
     ranks = draw(st.lists(st.integers(1, 3), min_size=count, max_size=count))
     own = draw(st.dictionaries(st.integers(0, count - 1), st.sampled_from([20.0, 90.0])))
-    rules = RuleMap(graph, draw(st.sampled_from([15.0, 60.0, 200.0])), ranks, 0, own)
+    rules = rule_map_of(graph, draw(st.sampled_from([15.0, 60.0, 200.0])), ranks, 0, own)
     seen = [-float(draw(st.integers(0, 80))) for _ in range(count)]
     met = draw(st.lists(st.booleans(), min_size=count, max_size=count))
     return rules, State(draw(st.integers(0, count - 1)), 0.0, seen, met)
@@ -443,7 +446,7 @@ def test_a_walk_ahead_is_cut_where_there_is_no_time_or_it_takes_too_many_moves(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     graph = chain(3)
-    rules = RuleMap(graph, 100.0, [1, 1, 1], 9)
+    rules = rule_map_of(graph, 100.0, [1, 1, 1], 9)
     begin = State(0, 0.0, [0.0] * 3, [False] * 3)
     draw = random.Random(2)
 

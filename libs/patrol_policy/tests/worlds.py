@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from hypothesis import strategies as st
 
+from patrol_policy.battery import Energy
+from patrol_policy.bounds import default_table
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.rollout import RuleMap
+from patrol_policy.rule_table import URGENT, RuleTable
 from patrol_policy.world import World
 
 SEVEN_ROOMS = {
@@ -54,7 +60,48 @@ def world(**changes: object) -> World:
         'graph': seven_rooms(),
         'threshold': 60.0,
     }
-    return World(**{**values, **changes})  # type: ignore[arg-type]
+    classes = {**values, **changes}['classes']
+    assert isinstance(classes, dict)
+    return World(**{**values, 'said': said_in(classes), **changes})  # type: ignore[arg-type]
+
+
+def said_in(classes: Mapping[str, frozenset[str]]) -> dict[str, bool]:
+    """Return what an ontology says that holds places to be of these classes."""
+    return {place: URGENT in kinds for place, kinds in classes.items()}
+
+
+def default_ranks(graph: PatrolGraph) -> list[int]:
+    return list(default_table(graph, 1.0).base)
+
+
+def table_of(
+    ranks: Sequence[int],
+    threshold: float,
+    urgent: int | None = 0,
+    own: Mapping[int, float] | None = None,
+) -> RuleTable:
+    """Return rules by which each place has a rank, and URGENT another one; None: it has none."""
+    order = [f'K{rank}' for rank in range(max(ranks) + 1)]
+    if urgent is not None:
+        order.insert(urgent, URGENT)
+    due = [rank if urgent is None else min(urgent, rank) for rank in ranks]
+    limits = [(own or {}).get(place, threshold) for place in range(len(ranks))]
+    return RuleTable(tuple(order), list(ranks), due, limits)
+
+
+def rule_map_of(
+    graph: PatrolGraph,
+    threshold: float,
+    ranks: Sequence[int] | None = None,
+    urgent: int | None = 0,
+    own: Mapping[int, float] | None = None,
+    energy: Energy | None = None,
+    windows: Mapping[int, Sequence[tuple[float, float]]] | None = None,
+    slower: float = 1.0,
+) -> RuleMap:
+    """Return a map with rules; default: places with several ways come before those with one."""
+    table = table_of(ranks or default_ranks(graph), threshold, urgent, own)
+    return RuleMap(graph, table, energy, windows, slower)
 
 
 @st.composite

@@ -7,8 +7,9 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from patrol_policy.decision import ANY, RECHARGE
+from patrol_policy.decision import RECHARGE
 from patrol_policy.promises import Promise
+from patrol_policy.rule_table import ANY
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError

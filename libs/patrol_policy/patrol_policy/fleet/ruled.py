@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from patrol_policy.battery import Battery
-from patrol_policy.decision import RECHARGE, URGENT, DecisionSettings, decide
+from patrol_policy.decision import RECHARGE, DecisionSettings, decide
 from patrol_policy.fleet.assignment import FleetChoice, FleetOutlook
 from patrol_policy.fleet.simulation import FleetPolicy, FleetView
 from patrol_policy.world import World
@@ -22,26 +22,21 @@ def ruled(
     """Return a policy by which each robot keeps the rules.
 
     Args:
-        classes: Of each place, without URGENT.
+        classes: Of each place.
         thresholds: Seconds after which each place is URGENT.
         settings: Of decisions.
     """
 
     def choose_place(view: FleetView, name: str) -> FleetChoice:
         graph, here = view.graph, view.robots[name].place
-        late = {place for place, at in view.visited_at.items() if view.now - at > thresholds[place]}
         world = World(
             place=here,
             now=view.now,
             reachable=tuple(graph.leg_seconds[here]),
-            classes={
-                place: found | {URGENT} if place in late else found
-                for place, found in classes.items()
-            },
+            classes=classes,
             visited_at=view.visited_at,
             graph=graph,
             own_thresholds=thresholds,
-            rules=settings.rules.classes,
             fleet=FleetOutlook(name, tuple(view.robots.values()), graph, view.settings),
         )
         found = decide(world, Battery(), settings)
