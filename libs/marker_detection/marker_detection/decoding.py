@@ -15,7 +15,7 @@ from marker_detection.image_sampling import (
     Patches,
     cell_widths,
 )
-from marker_detection.template_fit import Footprint, TemplateFit
+from marker_detection.template_fit import PixelFootprint, TemplateFit
 
 # along a side of a cell, until the likeliest codes are aligned
 _ROUGH_SAMPLES = 2
@@ -188,7 +188,7 @@ class MarkerReader:
         homographies: Array,
         blur: Array,
         listed: Indices | None,
-    ) -> tuple[Indices, Patches, Patches, Footprint]:
+    ) -> tuple[Indices, Patches, Patches, PixelFootprint]:
         levels = fit.levels(homographies)
         patches = fit.sample(pyramid, homographies, levels)
         footprint = fit.footprint(homographies, levels, blur)

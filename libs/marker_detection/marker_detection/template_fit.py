@@ -38,15 +38,15 @@ _SETTLED = 2e-3
 _DEVIATIONS = np.geomspace(0.02, 2.0, 96)
 
 
-class Footprint(NamedTuple):
+class PixelFootprint(NamedTuple):
     """Blur of candidates in marker units, as rows (m,) of the table of profiles."""
 
     down: Indices
     across: Indices
 
-    def chosen(self, which: Indices) -> Footprint:
+    def chosen(self, which: Indices) -> PixelFootprint:
         """Return the blur of some of the candidates."""
-        return Footprint(self.down[which], self.across[which])
+        return PixelFootprint(self.down[which], self.across[which])
 
 
 class TemplateFit:
@@ -101,7 +101,7 @@ class TemplateFit:
         middle = parts[:, :, step // 2, :, step // 2]
         return np.asarray((middle + parts.mean(axis=(2, 4))) / 2.0)
 
-    def footprint(self, homographies: Array, levels: Indices, blur: Array) -> Footprint:
+    def footprint(self, homographies: Array, levels: Indices, blur: Array) -> PixelFootprint:
         """Blur of each candidate.
 
         Args:
@@ -118,10 +118,10 @@ class TemplateFit:
         rows = np.linalg.norm(jacobians[:, ::-1, ::-1], axis=1)
         deviation = rows * np.sqrt(variance) / np.abs(np.linalg.det(jacobians))[:, None]
         index = np.searchsorted(_DEVIATIONS, deviation).clip(0, len(_DEVIATIONS) - 1)
-        return Footprint(index[:, 1], index[:, 0])
+        return PixelFootprint(index[:, 1], index[:, 0])
 
     def score(
-        self, patches: Patches, footprint: Footprint, listed: Indices | None = None
+        self, patches: Patches, footprint: PixelFootprint, listed: Indices | None = None
     ) -> tuple[Indices, Patches]:
         """Return the most likely codes of each patch and their correlations, the best one first.
 
@@ -155,11 +155,11 @@ class TemplateFit:
         return listed[rows, order], correlation[rows, order]
 
     def inner_correlations(
-        self, patches: Patches, entries: Indices, footprint: Footprint
+        self, patches: Patches, entries: Indices, footprint: PixelFootprint
     ) -> Patches:
         """Correlations (m, j) of codes (m, j) over their own cells, without border and margin."""
         count, listed = entries.shape
-        repeated = Footprint(footprint.down.repeat(listed), footprint.across.repeat(listed))
+        repeated = PixelFootprint(footprint.down.repeat(listed), footprint.across.repeat(listed))
         drawn = self._render(entries.ravel(), repeated)[:, self._inside]
         drawn = drawn.reshape(count, listed, drawn.shape[1])
         seen = patches[:, self._inside]
@@ -249,12 +249,12 @@ class TemplateFit:
             left = each[near] * part
             each[near] = left - part * left.sum(axis=-1, keepdims=True) / count.reshape(wide)
 
-    def _render(self, entries: Indices, footprint: Footprint) -> Patches:
+    def _render(self, entries: Indices, footprint: PixelFootprint) -> Patches:
         down, across = self._profile[footprint.down], self._profile[footprint.across]
         drawn = down @ self.codes.cells[entries] @ across.transpose(0, 2, 1)
         return np.asarray(drawn.reshape(len(entries), self.count**2))
 
-    def _steepest(self, entries: Indices, footprint: Footprint) -> Patches:
+    def _steepest(self, entries: Indices, footprint: PixelFootprint) -> Patches:
         """Change (m, 8, n) of the templates by each parameter of a homography."""
         cells = self.codes.cells[entries]
         down, across = self._profile[footprint.down], self._profile[footprint.across]
@@ -265,7 +265,7 @@ class TemplateFit:
             slope_x.reshape(flat) * self._warp_x + slope_y.reshape(flat) * self._warp_y
         )
 
-    def _energy(self, cells: Patches, footprint: Footprint) -> Patches:
+    def _energy(self, cells: Patches, footprint: PixelFootprint) -> Patches:
         """Sum of squares (m, j) of the centred templates of codes (m, j, rows, columns)."""
         count, listed, side, _ = cells.shape
         columns = cells.transpose(0, 2, 1, 3).reshape(count, side, listed * side)

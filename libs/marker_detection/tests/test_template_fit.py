@@ -9,7 +9,7 @@ import pytest
 
 from marker_detection.dictionaries import MarkerCodes, dictionary_named
 from marker_detection.image_sampling import ImagePyramid, corners_of, homographies_of
-from marker_detection.template_fit import Footprint, TemplateFit
+from marker_detection.template_fit import PixelFootprint, TemplateFit
 
 from .drawn_codes import SQUARE
 
@@ -62,7 +62,7 @@ def test_codes_are_matched_as_if_each_was_drawn_with_its_blur(samples, border):
     )
     noise = np.random.default_rng(1).normal(0.0, 1.0, patches.shape).astype(np.float32)
     patches += noise
-    footprint = Footprint(down, across)
+    footprint = PixelFootprint(down, across)
     entries, correlation = fit.score(patches, footprint)
     assert entries[:, 0].tolist() == truth.tolist()
     assert entries.shape == (3, 12)
@@ -91,10 +91,10 @@ def test_codes_are_matched_as_if_each_was_drawn_with_its_blur(samples, border):
 def test_few_codes_are_all_matched():
     fit = TemplateFit(codes_of(2))
     patch = drawn(fit, 3, 5, 40, 40)[None].astype(np.float32)
-    entries, correlation = fit.score(patch, Footprint(np.array([40]), np.array([40])))
+    entries, correlation = fit.score(patch, PixelFootprint(np.array([40]), np.array([40])))
     assert sorted(entries[0].tolist()) == list(range(8))
     assert correlation[0, 0] == pytest.approx(1.0, abs=1e-4)
-    even = fit.score(np.full_like(patch, 9.0), Footprint(np.array([40]), np.array([40])))[1]
+    even = fit.score(np.full_like(patch, 9.0), PixelFootprint(np.array([40]), np.array([40])))[1]
     assert even == pytest.approx(np.zeros((1, 8)))
 
 

@@ -24,7 +24,14 @@ from state_machines.exceptions import (
 )
 from state_machines.execution import ExecutionThread, LeftBehindError
 from state_machines.frame import AGAIN, Frame, Move, answer_of, call, execute_root, run
-from state_machines.program import SUSPENDED, Exit, History, LimitOptions, Node, Program
+from state_machines.program import (
+    SUSPENDED,
+    ContainerProgram,
+    Exit,
+    History,
+    LimitOptions,
+    StateNode,
+)
 from state_machines.state import State, this_thread
 from state_machines.timeouts import leave_behind, supervise
 
@@ -69,7 +76,7 @@ class ChildFrame(Frame):
 
     state = ChildState.RUNS
 
-    def __init__(self, within: ConcurrentFrame, node: Node, thread: ExecutionThread) -> None:
+    def __init__(self, within: ConcurrentFrame, node: StateNode, thread: ExecutionThread) -> None:
         super().__init__(within.program, thread, None)
         self.current = self.node = node
 
@@ -146,7 +153,7 @@ class ChildFrame(Frame):
     # What others want; under the machine's condition.
 
     @property
-    def making_way(self) -> Node | None:  # type: ignore[override]
+    def making_way(self) -> StateNode | None:  # type: ignore[override]
         """The node, if its state was asked to make way for an interrupt."""
         return self.node if self.state & ChildState.MAKES_WAY else None
 
@@ -233,7 +240,7 @@ class ConcurrentFrame(Frame):
         outcomes: What each state ended with; None for those that have not ended.
     """
 
-    def __init__(self, program: Program, thread: ExecutionThread, parent_ud: Any) -> None:
+    def __init__(self, program: ContainerProgram, thread: ExecutionThread, parent_ud: Any) -> None:
         super().__init__(program, thread, parent_ud)
         self.outcomes: Outcomes = dict.fromkeys(program.states)
         self._begin_anew()
@@ -261,7 +268,7 @@ class ConcurrentFrame(Frame):
         with self.control.condition:
             self.outcomes.update(history.outcomes)
 
-    def history_before(self, target: Node | Exit) -> History:
+    def history_before(self, target: StateNode | Exit) -> History:
         """Return where to go on when the container is put aside before `target`."""
         history = super().history_before(target)
         history.outcomes = {label: end for label, end in self.outcomes.items() if end is not None}
@@ -664,7 +671,7 @@ class Concurrence(Container):
 
     # Running.
 
-    def fsm_make_table(self) -> dict[str, Node]:
+    def fsm_make_table(self) -> dict[str, StateNode]:
         """Make the nodes of all states, and the one without a label that runs them together."""
         table, program = {}, self.fsm_program
         for label, state in program.states.items():
@@ -677,7 +684,7 @@ class Concurrence(Container):
         node.targets = {outcome: Exit(outcome) for outcome in self.get_registered_outcomes()}
         return table
 
-    def fsm_first_of(self, table: Mapping[str, Node]) -> Node:
+    def fsm_first_of(self, table: Mapping[str, StateNode]) -> StateNode:
         """Return the node that runs all states."""
         return table['']
 

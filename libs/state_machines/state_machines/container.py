@@ -1,8 +1,8 @@
 """The container: a state that runs other states, built under ``with``.
 
 `Container` is the interface that its kinds have in common: construction, callbacks, execution,
-interrupts. What it was given is in its `Program`, and how that is run is the matter of the loop
-(`frame`).
+interrupts. What it was given is in its `ContainerProgram`, and how that is run is the matter of the
+loop (`frame`).
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from state_machines.program import (
     TIMEOUT,
     Branch,
     Callback,
+    ContainerProgram,
     Exit,
     LimitOptions,
-    Node,
-    Program,
+    StateNode,
     make_limits,
 )
 from state_machines.state import State, structure_version, this_thread
@@ -82,7 +82,7 @@ class Container(State):
         'autonomy',
     )
 
-    fsm_program: Program
+    fsm_program: ContainerProgram
     _control: Control | None = None
     _preempt_timeout: float | None = None
     fsm_of_execution: ClassVar[frozenset[str]] = State.fsm_of_execution | {'_control'}
@@ -95,7 +95,7 @@ class Container(State):
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
         self.userdata = UserData()
-        self.fsm_program = Program(self, type(self).__name__)
+        self.fsm_program = ContainerProgram(self, type(self).__name__)
 
     # What each kind of container defines.
 
@@ -126,11 +126,11 @@ class Container(State):
         """Return what keeps the container from running, but for its interrupts."""
         raise NotImplementedError
 
-    def fsm_make_table(self) -> dict[str, Node]:
+    def fsm_make_table(self) -> dict[str, StateNode]:
         """Make the nodes of the states by label, and say where their outcomes lead."""
         raise NotImplementedError
 
-    def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
+    def fsm_first_of(self, table: Mapping[str, StateNode]) -> StateNode | Exit:
         """Return the node of a table that an execution begins with."""
         raise NotImplementedError
 
@@ -417,7 +417,7 @@ class Container(State):
         thread: ExecutionThread | None = here.thread
         if thread is not None and here.stack:
             current = here.stack[-1].current
-            if isinstance(current, Node) and current.state is self:
+            if isinstance(current, StateNode) and current.state is self:
                 # It is the engine that executes it, not the code of a state.
                 return execute_root(here.stack, thread, self.fsm_program, parent_ud)
         return self._execute_as_root(parent_ud)

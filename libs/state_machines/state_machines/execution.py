@@ -28,7 +28,15 @@ from state_machines import log
 from state_machines.autonomy import Autonomy, Question, level_of
 from state_machines.clock import WALL_CLOCK, Clock, Interrupt, elapsed_of
 from state_machines.exceptions import InvalidStateError, InvalidTransitionError, describe
-from state_machines.program import Entry, Exit, Limits, Node, Noted, RawTransition, Trace
+from state_machines.program import (
+    Exit,
+    Noted,
+    RawTransition,
+    StateEntry,
+    StateLimits,
+    StateNode,
+    Trace,
+)
 from state_machines.state import this_thread
 
 IDLE_SECONDS = 10.0
@@ -64,12 +72,12 @@ STOPPED = ('preempted', 'aborted')
 """Outcomes that a state may be taken to have ended with that was left behind."""
 
 
-def stopped_outcome(node: Node) -> str | None:
+def stopped_outcome(node: StateNode) -> str | None:
     """Return the outcome that a state is taken to have ended with, if it has one for that."""
     return next((outcome for outcome in STOPPED if outcome in node.targets), None)
 
 
-class Place(Protocol):
+class Position(Protocol):
     """What a thread and the control know of a frame: where the thread is in one container.
 
     Attributes:
@@ -83,10 +91,10 @@ class Place(Protocol):
     """
 
     thread: ExecutionThread
-    current: Node | Exit
+    current: StateNode | Exit
     attention: bool
-    forced: tuple[Node, str] | None
-    left: Node | None
+    forced: tuple[StateNode, str] | None
+    left: StateNode | None
     question: Question | None
 
     @property
@@ -312,14 +320,14 @@ class Control:
         with self.condition:
             return list(self._active())
 
-    def _active(self) -> dict[str, tuple[Place, Node]]:
+    def _active(self) -> dict[str, tuple[Position, StateNode]]:
         """Return the active states by path: the frames they run in, and their nodes."""
-        active: dict[str, tuple[Place, Node]] = {}
+        active: dict[str, tuple[Position, StateNode]] = {}
         for thread in self.threads:
             for frame in tuple(thread.stack):
                 node = frame.current
                 # All states of a concurrence together have no label.
-                if isinstance(node, Node) and node.label:
+                if isinstance(node, StateNode) and node.label:
                     active[f'{frame.path}/{node.label}'] = frame, node
         return active
 
@@ -369,7 +377,7 @@ class Watch:
         asked: The state was asked to stop.
     """
 
-    node: Node
+    node: StateNode
     depth: int
     soft: float | None
     hard: float | None
@@ -411,7 +419,7 @@ class ExecutionThread:
     def path_inside(self) -> str:
         """Return the path of the state that is being executed."""
         for frame in reversed(self.stack):
-            if isinstance(frame.current, Node):
+            if isinstance(frame.current, StateNode):
                 return frame.current.path
             return f'{frame.path}/{frame.current.label}'
         return self.path
@@ -472,14 +480,14 @@ class ExecutionThread:
         if self.asked_at is not None:
             self.asked_at = time.monotonic()
 
-    def renew_request(self, node: Node) -> None:
+    def renew_request(self, node: StateNode) -> None:
         """Take the request of an earlier execution back from a state, but not a present one."""
         with self.control.condition:
             node.state.recall_preempt()
             if self.asked_at is not None:
                 node.state.request_preempt()
 
-    def still_running(self, node: Node) -> None:
+    def still_running(self, node: StateNode) -> None:
         """Note that a state could not be entered: an earlier execution of it has not ended."""
         with self.control.condition:
             self.check()
@@ -488,7 +496,7 @@ class ExecutionThread:
 
     # Limits at work.
 
-    def begin_watch(self, node: Node, limits: Limits) -> Watch:
+    def begin_watch(self, node: StateNode, limits: StateLimits) -> Watch:
         """Put limits to work on the state that the innermost frame is about to execute."""
         now = self.control.now()
         with self.control.condition:
@@ -542,14 +550,14 @@ class Work:
         try:
             worker = _idle.pop()
         except IndexError:
-            worker = _Worker()
+            worker = _WorkerThread()
         worker.given.put(self)
 
     def is_going_on(self) -> bool:
         """Tell whether it has not ended."""
         return self._going_on.locked()
 
-    def block_reentry(self, node: Node) -> None:
+    def block_reentry(self, node: StateNode) -> None:
         """Enter a state again only when this work, which was left behind in it, has ended."""
         entry, state = node.entry, node.state
         state.fsm_left = self
@@ -572,7 +580,9 @@ class Work:
         node.execute = wait_and_execute
         if entry is not None:
             # It is called, and not gone into; its limits hold as before.
-            node.entry = Entry(None, node.view, entry.limits, entry.approvals, draws=entry.draws)
+            node.entry = StateEntry(
+                None, node.view, entry.limits, entry.approvals, draws=entry.draws
+            )
 
     def await_end(self, seconds: float | None) -> bool:
         """Wait for the end, in seconds of steady time; whether it came."""
@@ -606,11 +616,11 @@ class Work:
         thread.wake_watcher()
 
 
-_idle: list[_Worker] = []
+_idle: list[_WorkerThread] = []
 os.register_at_fork(after_in_child=_idle.clear)
 
 
-class _Worker:
+class _WorkerThread:
     """A thread of the interpreter that does one piece of work after another.
 
     Attributes:

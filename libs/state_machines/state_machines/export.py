@@ -12,7 +12,7 @@ from typing import Any
 
 from state_machines.container import Container
 from state_machines.program import RESUME
-from state_machines.structure import Edge, Structure
+from state_machines.structure import PossibleTransition, Structure
 
 __all__ = ['to_ascii', 'to_graphviz', 'to_mermaid']
 
@@ -165,7 +165,7 @@ def _ascii(structure: Structure, marked: set[str], indent: str) -> Drawn:
             yield _ascii(inner, marked, indent + ('     ' if last else '|    '))
 
 
-def _bundles(edges: Iterable[Edge]) -> list[tuple[str, str, bool, list[str]]]:
+def _bundles(edges: Iterable[PossibleTransition]) -> list[tuple[str, str, bool, list[str]]]:
     """Edges between the same two places as one: (source, target, leaving, outcomes)."""
     bundles: dict[tuple[str, str, bool], list[str]] = {}
     for edge in edges:

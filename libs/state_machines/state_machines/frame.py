@@ -24,11 +24,11 @@ from state_machines.program import (
     LOWEST,
     RESUMPTION,
     SUSPENDED,
+    ContainerProgram,
     Exit,
     History,
-    Node,
     Noted,
-    Program,
+    StateNode,
 )
 from state_machines.state import State
 from state_machines.userdata import Remapper, raw
@@ -204,7 +204,7 @@ def _run(stack: list[Any], base: int) -> Any:
                 frame.container.call_transition_cbs()
 
 
-def call(node: Node) -> Any:
+def call(node: StateNode) -> Any:
     """Execute a state that is no container; its outcome.
 
     Raises:
@@ -221,7 +221,7 @@ def call(node: Node) -> Any:
 def enter(
     stack: list[Any],
     thread: ExecutionThread,
-    program: Program,
+    program: ContainerProgram,
     path: str,
     parent_ud: Any,
     outer: Frame | None,
@@ -263,7 +263,9 @@ def enter(
     return frame
 
 
-def execute_root(stack: list[Any], thread: ExecutionThread, program: Program, ud: Any) -> Any:
+def execute_root(
+    stack: list[Any], thread: ExecutionThread, program: ContainerProgram, ud: Any
+) -> Any:
     """Execute a container with whatever userdata it is given; its outcome or `SUSPENDED`.
 
     Args:
@@ -327,9 +329,9 @@ def warn_of_output(container: Any, key: str) -> None:
 class Move(NamedTuple):
     """A transition to be told: the state left (None at the start), its outcome, where to, kind."""
 
-    left: Node | None
+    left: StateNode | None
     outcome: Any
-    target: Node | Exit
+    target: StateNode | Exit
     kind: str
 
 
@@ -411,25 +413,25 @@ class Frame:
     # Class attributes: most executions of a container need none of them.
     attention = False
     abandoned = False
-    preempted: Node | None = None
-    making_way: Node | None = None
+    preempted: StateNode | None = None
+    making_way: StateNode | None = None
     suspending = False
-    left: Node | None = None
-    forced: tuple[Node, str] | None = None
+    left: StateNode | None = None
+    forced: tuple[StateNode, str] | None = None
     ended = False
-    saved: tuple[Node | Exit, ...] = ()
-    stopped: Node | Exit = SHUTDOWN
+    saved: tuple[StateNode | Exit, ...] = ()
+    stopped: StateNode | Exit = SHUTDOWN
     watch: Watch | None = None
     attempt = 0
     question: Question | None = None
-    held: tuple[Node, str] | None = None
+    held: tuple[StateNode, str] | None = None
     watches_threads = False
 
-    def __init__(self, program: Program, thread: ExecutionThread, parent_ud: Any) -> None:
+    def __init__(self, program: ContainerProgram, thread: ExecutionThread, parent_ud: Any) -> None:
         self.program = program
         self.container: Any = program.container
         self.thread = thread
-        self.current: Node | Exit = program.first
+        self.current: StateNode | Exit = program.first
         self.parent_ud = parent_ud
 
     @property
@@ -449,7 +451,7 @@ class Frame:
 
     # From the beginning to the end.
 
-    def begin(self) -> Node | Exit:
+    def begin(self) -> StateNode | Exit:
         """Go to the first state, or to the one that the history names; return it."""
         container, program, control = self.container, self.program, self.control
         history, program.history = program.history, None
@@ -480,7 +482,7 @@ class Frame:
     def go_on_after(self, outcome: Any) -> None:
         """Go on as if the current state had just returned `outcome`."""
         node = self.current
-        assert isinstance(node, Node)
+        assert isinstance(node, StateNode)
         self.current = target = node.target(outcome)
         node.release()
         self.attend(node, outcome, target)
@@ -536,7 +538,7 @@ class Frame:
 
     # Around a state with limits.
 
-    def before(self, node: Node) -> Any:
+    def before(self, node: StateNode) -> Any:
         """Put the limits of the state to work that is about to be executed.
 
         Returns:
@@ -551,7 +553,7 @@ class Frame:
             self.watch = self.thread.begin_watch(node, limits)
         return None
 
-    def after(self, node: Node, outcome: Any) -> Any:
+    def after(self, node: StateNode, outcome: Any) -> Any:
         """End the limits of a state that returned; its outcome, or `AGAIN` for another attempt."""
         limits = node.limits
         self.thread.check()
@@ -573,7 +575,7 @@ class Frame:
         )
         return AGAIN
 
-    def _end_watch(self, node: Node, outcome: Any) -> Any:
+    def _end_watch(self, node: StateNode, outcome: Any) -> Any:
         """Turn what a state returned after running out of time into the outcome for that."""
         watch, limits = self.watch, node.limits
         if watch is None or limits is None:
@@ -593,7 +595,7 @@ class Frame:
 
     # Waiting for a person.
 
-    def _ask(self, node: Node, outcome: Any) -> Any:
+    def _ask(self, node: StateNode, outcome: Any) -> Any:
         """Return the outcome to go on with, after a question where the transition needs one."""
         entry, control = node.entry, self.thread.control
         approvals = entry.approvals if entry is not None else None
@@ -634,7 +636,7 @@ class Frame:
             self.thread.check()
             return self._settle_question(node, outcome, question.answer)
 
-    def _settle_question(self, node: Node, outcome: str, answer: str | None) -> Any:
+    def _settle_question(self, node: StateNode, outcome: str, answer: str | None) -> Any:
         """Return the outcome to go on with, the wait being over; under the machine's condition.
 
         Args:
@@ -657,7 +659,9 @@ class Frame:
 
     # Between two states.
 
-    def attend(self, left: Node | None, outcome: Any, target: Node | Exit) -> Node | Exit:
+    def attend(
+        self, left: StateNode | None, outcome: Any, target: StateNode | Exit
+    ) -> StateNode | Exit:
         """Do what comes between two states beside the transition itself.
 
         Args:
@@ -696,7 +700,7 @@ class Frame:
             stood, outcome = True, ''
             left = target  # type: ignore[assignment]
 
-    def _leave_preempted(self, node: Node, outcome: Any, target: Node | Exit) -> bool:
+    def _leave_preempted(self, node: StateNode, outcome: Any, target: StateNode | Exit) -> bool:
         """Leave the container because of a preempt, if nothing else is to be looked at.
 
         It is what `attend` does in general, for the way on which a preempt ends nested machines.
@@ -727,8 +731,8 @@ class Frame:
         return True
 
     def _decide(
-        self, left: Node | None, outcome: Any, target: Node | Exit, *, stood: bool
-    ) -> tuple[Node | Exit, list[Move]]:
+        self, left: StateNode | None, outcome: Any, target: StateNode | Exit, *, stood: bool
+    ) -> tuple[StateNode | Exit, list[Move]]:
         """Return where to go, and the transitions to be told; under the machine's condition.
 
         Args:
@@ -754,9 +758,9 @@ class Frame:
         if move is not None:
             outcome = move.outcome
         preempted = container.preempt_requested()
-        if preempted and isinstance(target, Node):
+        if preempted and isinstance(target, StateNode):
             self._preempt_next(target)
-        elif self.suspending and (isinstance(target, Node) or program.raised):
+        elif self.suspending and (isinstance(target, StateNode) or program.raised):
             # At its end, too, while interrupts are to run before that: they wait with it.
             program.history = self.history_before(target)
             return ASIDE, moves if move is None or left is None else [*moves, move]
@@ -771,7 +775,7 @@ class Frame:
             return SHUTDOWN, moves
         return target, moves if move is None else [*moves, move]
 
-    def _settle_making_way(self, ended: Node | None) -> None:
+    def _settle_making_way(self, ended: StateNode | None) -> None:
         """Take the request to make way back from a state that had not begun when it came."""
         node = self.making_way
         if node is not None and node is not ended:
@@ -781,7 +785,7 @@ class Frame:
                 self.preempted = None  # It is asked again.
             self.making_way = None
 
-    def _leave(self, node: Node, outcome: Any, target: Node | Exit) -> Move | None:
+    def _leave(self, node: StateNode, outcome: Any, target: StateNode | Exit) -> Move | None:
         """Settle what was asked of the state that ended, and leave it.
 
         Returns:
@@ -809,7 +813,7 @@ class Frame:
             return self._leave_branch(Move(node, outcome, target, kind))
         return Move(node, outcome, target, kind)
 
-    def _answer_of(self, node: Node, outcome: Any) -> Answer:
+    def _answer_of(self, node: StateNode, outcome: Any) -> Answer:
         """Tell what a state's end answers; nothing is asked of it any more."""
         preempted, making_way = self.preempted is node, self.making_way is node
         left = self.left is node
@@ -825,16 +829,16 @@ class Frame:
             self.saved = tuple(saved)
             return move._replace(target=target, kind='resume')
         for node in self.saved:
-            if isinstance(node, Node):
+            if isinstance(node, StateNode):
                 node.state.fsm_forget()
         self.saved = ()
         return move
 
-    def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
+    def _end_of_loop(self, outcome: Any, target: StateNode | Exit) -> StateNode | Exit:
         """Return where a preempt leads that came while a state led to itself; an iterator ends."""
         return target
 
-    def _preempt_next(self, target: Node) -> None:
+    def _preempt_next(self, target: StateNode) -> None:
         """Ask the next state to stop, because the last one did not acknowledge the preempt."""
         if self.preempted is not target:
             if self.preempted is not None:
@@ -843,12 +847,12 @@ class Frame:
             self.thread.asked()
             target.state.request_preempt()
 
-    def _stands_still(self, target: Node | Exit) -> bool:
+    def _stands_still(self, target: StateNode | Exit) -> bool:
         """Tell whether the machine is paused here; takes one step if it may."""
         steering = self.control
         if not steering.paused or self.suspending:
             return False
-        if not isinstance(target, Node) or target.state.fsm_program is not None:
+        if not isinstance(target, StateNode) or target.state.fsm_program is not None:
             return False
         if any(other.container.preempt_requested() for other in self.thread.stack):
             return False
@@ -857,7 +861,7 @@ class Frame:
             return False
         return True
 
-    def _wants_attention(self, target: Node | Exit) -> bool:
+    def _wants_attention(self, target: StateNode | Exit) -> bool:
         return bool(
             self.container.preempt_requested()
             or self.program.raised
@@ -866,7 +870,7 @@ class Frame:
             or self.making_way
             or self.forced
             or self.control.paused
-            or (isinstance(target, Node) and target.state.fsm_progress)
+            or (isinstance(target, StateNode) and target.state.fsm_progress)
         )
 
     # Telling.
@@ -888,7 +892,7 @@ class Frame:
         elif self.program.termination_cbs:
             container.call_termination_cbs([left.label], target.label)
 
-    def log_move(self, left: Node, outcome: Any, target: Node | Exit) -> None:
+    def log_move(self, left: StateNode, outcome: Any, target: StateNode | Exit) -> None:
         verb = 'ends' if target.is_exit else 'goes on'
         log.loginfo(f"'{self.path}' {verb}: '{left.label}' : '{outcome}' --> '{target.label}'")
 
@@ -921,7 +925,7 @@ class Frame:
         while frame is not None:
             frame.attention = True
             current = frame.current
-            if not isinstance(current, Node) or frame.preempted is current:
+            if not isinstance(current, StateNode) or frame.preempted is current:
                 break
             frame.preempted = current
             frame.thread.asked()
@@ -951,7 +955,7 @@ class Frame:
         while frame is not None:
             frame.suspending = frame.attention = True
             current = frame.current
-            if not isinstance(current, Node) or frame.making_way is current:
+            if not isinstance(current, StateNode) or frame.making_way is current:
                 return
             frame.making_way = current
             if frame.question is not None:
@@ -966,7 +970,7 @@ class Frame:
     def make_way(self) -> None:
         """Ask the state that runs to make way for an interrupt."""
         current = self.current
-        if isinstance(current, Node) and self.making_way is not current:
+        if isinstance(current, StateNode) and self.making_way is not current:
             self.making_way = current
             self.thread.asked()
             current.state.fsm_suspend()
@@ -979,7 +983,7 @@ class Frame:
             return self.program.history
         return self.history_before(self.stopped if self.current is SHUTDOWN else self.current)
 
-    def history_before(self, target: Node | Exit) -> History:
+    def history_before(self, target: StateNode | Exit) -> History:
         """Return where to go on when the container is put aside before `target`."""
         return History(
             target.label,

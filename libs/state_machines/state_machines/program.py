@@ -1,8 +1,8 @@
 """What a container is compiled into: a node for each state, with its limits and its targets.
 
-A `Program` holds what a container was given by its builder (states, interrupts, remappings, limits,
-callbacks), the table of nodes made of that, and where its execution is. The loop (`frame`) executes
-programs; a container is the interface to one.
+A `ContainerProgram` holds what a container was given by its builder (states, interrupts,
+remappings, limits, callbacks), the table of nodes made of that, and where its execution is. The
+loop (`frame`) executes programs; a container is the interface to one.
 
 Also what is told of a transition from one node to the next.
 """
@@ -64,7 +64,7 @@ RESUMPTION = Exit(RESUME)
 
 
 @dataclass(frozen=True)
-class Limits:
+class StateLimits:
     """What a container holds a state to.
 
     Attributes:
@@ -115,7 +115,7 @@ def make_limits(
     deadline: float | None = None,
     retry: int = 0,
     retry_on: Iterable[str] = ('aborted',),
-) -> Limits | None:
+) -> StateLimits | None:
     """Check limits and settle which outcome running out of time has.
 
     Args:
@@ -156,10 +156,10 @@ def make_limits(
             f"State '{path}' has retry {retry} but none of the outcomes {sorted(retry_on)} to "
             f'retry on (its outcomes are {sorted(outcomes)})'
         )
-    return Limits(timeout, deadline, retry, frozenset(failures), late)
+    return StateLimits(timeout, deadline, retry, frozenset(failures), late)
 
 
-class Entry:
+class StateEntry:
     """How a state is executed for which calling its ``execute`` is not all.
 
     Attributes:
@@ -188,9 +188,9 @@ class Entry:
 
     def __init__(
         self,
-        program: Program | None,
+        program: ContainerProgram | None,
         view: Remapper,
-        limits: Limits | None,
+        limits: StateLimits | None,
         approvals: Mapping[str, Approval] | None,
         *,
         draws: bool,
@@ -205,7 +205,7 @@ class Entry:
         """Whether the frame is asked before and after the state (`Frame.before`)."""
 
 
-class Node:
+class StateNode:
     """One state of a container as the loop needs it.
 
     Attributes:
@@ -236,9 +236,9 @@ class Node:
         self.path = path
         self.state = state
         self.execute: Callable[[Any], Any] = state.execute
-        self.entry: Entry | None = None
+        self.entry: StateEntry | None = None
         self.view = view
-        self.targets: dict[Any, Node | Exit] = {}
+        self.targets: dict[Any, StateNode | Exit] = {}
         self.priority = priority
 
     @property
@@ -247,16 +247,16 @@ class Node:
         return self.path[: -len(self.label) - 1] if self.label else self.path
 
     @property
-    def program(self) -> Program | None:
+    def program(self) -> ContainerProgram | None:
         """The program of the container that the loop goes into here, if it does."""
         return None if self.entry is None else self.entry.program
 
     @property
-    def limits(self) -> Limits | None:
+    def limits(self) -> StateLimits | None:
         """Time limits and retries, if the state has any."""
         return None if self.entry is None else self.entry.limits
 
-    def target(self, outcome: Any) -> Node | Exit:
+    def target(self, outcome: Any) -> StateNode | Exit:
         """Return where `outcome` leads.
 
         Raises:
@@ -340,7 +340,7 @@ Callback = tuple[Callable[..., Any], tuple[Any, ...]]
 _raise_lock = threading.Lock()
 
 
-class Program:
+class ContainerProgram:
     """What a container holds, compiled for the loop.
 
     Args:
@@ -367,7 +367,7 @@ class Program:
     frame: Any = None
     history: History | None = None
     raised: tuple[Branch, ...] = ()
-    table: Mapping[str, Node] = {}
+    table: Mapping[str, StateNode] = {}
     first: Any = None
     data: dict[str, Any]
     # What the table was made for; see `is_current`.
@@ -386,7 +386,7 @@ class Program:
         self.branches: dict[str, Branch] = {}
         self.remappings: dict[str, Mapping[str, str]] = {}
         self.constants: dict[str, Mapping[str, Any]] = {}
-        self.limits: dict[str, Limits] = {}
+        self.limits: dict[str, StateLimits] = {}
         self.approvals: dict[str, Mapping[str, Approval]] = {}
         self.start_cbs: list[Callback] = []
         self.transition_cbs: list[Callback] = []
@@ -417,7 +417,7 @@ class Program:
         state: State,
         remapping: Mapping[str, str] | None,
         constants: Mapping[str, Any] | None,
-        limits: Limits | None,
+        limits: StateLimits | None,
     ) -> None:
         """Put a state under its label; what is said of it has been checked."""
         self.states[label] = state
@@ -464,7 +464,7 @@ class Program:
 
     def node(
         self, label: str, state: State, priority: float = LOWEST, *, draws: bool = False
-    ) -> Node:
+    ) -> StateNode:
         """Make the node of one state; its targets are left to the container's kind."""
         path = self.path_of(label)
         view = Remapper(
@@ -475,19 +475,19 @@ class Program:
             self.constants.get(label),
             path,
         )
-        node = Node(label, path, state, view, priority)
+        node = StateNode(label, path, state, view, priority)
         if state.fsm_clock is not self._clock:
             state.fsm_clock = self._clock
         limits = self.limits.get(label)
         program = state.fsm_program if state.fsm_is_entered() else None
         approvals = self.approvals.get(label)
         if program is not None or limits is not None or approvals is not None or draws:
-            node.entry = Entry(program, view, limits, approvals, draws=draws)
+            node.entry = StateEntry(program, view, limits, approvals, draws=draws)
         if state.fsm_left is not None:
             state.fsm_left.block_reentry(node)
         return node
 
-    def _with_branches(self, table: dict[str, Node]) -> dict[str, Node]:
+    def _with_branches(self, table: dict[str, StateNode]) -> dict[str, StateNode]:
         """Add the nodes of interrupts to those of states."""
         states = dict(table) if self.branches else table
         for branch in self.branches.values():
@@ -546,7 +546,7 @@ class Program:
             self.raised = tuple(each for each in self.raised if each is not urgent)
             return urgent
 
-    def place(self, label: str, leaving: bool) -> Node | Exit:
+    def place(self, label: str, leaving: bool) -> StateNode | Exit:
         """Return the node that a history names.
 
         Raises:
@@ -593,7 +593,7 @@ class Noted(NamedTuple):
         return self.kind not in ('start', 'entered', 'question', 'end')
 
 
-RawTransition = Noted | tuple[Node, Any, float, dict[str, Any]]
+RawTransition = Noted | tuple[StateNode, Any, float, dict[str, Any]]
 """A transition; one that is as the table says may be told as what was left, its outcome, the time
 and a shallow copy of the container's userdata, which costs the loop least."""
 

@@ -18,7 +18,7 @@ from state_machines.exceptions import (
 )
 from state_machines.frame import AGAIN, Frame, Move
 from state_machines.log import logwarn
-from state_machines.program import SUSPENDED, Exit, History, LimitOptions, Node
+from state_machines.program import SUSPENDED, Exit, History, LimitOptions, StateNode
 from state_machines.state import State, structure_version
 from state_machines.userdata import UserData, raw
 
@@ -182,7 +182,7 @@ class StateMachine(Container):
 
     # Running.
 
-    def fsm_make_table(self) -> dict[str, Node]:
+    def fsm_make_table(self) -> dict[str, StateNode]:
         """Make the nodes of all states and interrupts."""
         program = self.fsm_program
         table = {label: program.node(label, state) for label, state in program.states.items()}
@@ -200,7 +200,7 @@ class StateMachine(Container):
                 table[label].targets.setdefault('preempted', exits['preempted'])
         return table
 
-    def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
+    def fsm_first_of(self, table: Mapping[str, StateNode]) -> StateNode | Exit:
         """Return the node of the initial state."""
         return table[self._initial_state_label]  # type: ignore[index]
 
@@ -318,7 +318,7 @@ class IteratorFrame(Frame):
         super().go_on_from(history)
         self.index, self.items, self.repeat = history.index, history.items, history.repeat
 
-    def history_before(self, target: Node | Exit) -> History:
+    def history_before(self, target: StateNode | Exit) -> History:
         """Return where to go on when the container is put aside before `target`."""
         history = super().history_before(target)
         history.index, history.items, history.repeat = self.index, self.items, self.repeat
@@ -361,7 +361,7 @@ class IteratorFrame(Frame):
             data[iterator.items_label] = item
         return True
 
-    def before(self, node: Node) -> Any:
+    def before(self, node: StateNode) -> Any:
         """Draw an item, but for another attempt; the outcome for having none."""
         if node.entry is None or not node.entry.draws:
             # An interrupt's.
@@ -370,7 +370,7 @@ class IteratorFrame(Frame):
             return self.container.fsm_exhausted
         return super().before(node)
 
-    def after(self, node: Node, outcome: Any) -> Any:
+    def after(self, node: StateNode, outcome: Any) -> Any:
         """As of any container; an item whose state made way has not ended."""
         outcome = super().after(node, outcome)
         if outcome is not AGAIN and node.entry is not None and node.entry.draws:
@@ -382,14 +382,14 @@ class IteratorFrame(Frame):
         self.repeat = outcome is SUSPENDED
         super().go_on_after(outcome)
 
-    def _leave(self, node: Node, outcome: Any, target: Node | Exit) -> Move | None:
+    def _leave(self, node: StateNode, outcome: Any, target: StateNode | Exit) -> Move | None:
         """As of any container; an item whose state made way has not ended."""
         move = super()._leave(node, outcome, target)
         if move is None:
             self.repeat = True
         return move
 
-    def _end_of_loop(self, outcome: Any, target: Node | Exit) -> Node | Exit:
+    def _end_of_loop(self, outcome: Any, target: StateNode | Exit) -> StateNode | Exit:
         """End the loop when a preempt came while it would go on.
 
         The iterator ends with ``preempted``, or, if it has no such outcome, with what the state's
@@ -508,7 +508,7 @@ class Iterator(Container):
 
     # Running: the state leads back to itself until something breaks the loop.
 
-    def fsm_make_table(self) -> dict[str, Node]:
+    def fsm_make_table(self) -> dict[str, StateNode]:
         """Make the nodes of the state and of all interrupts."""
         program = self.fsm_program
         label = self._state_label
@@ -525,7 +525,7 @@ class Iterator(Container):
         """Return the iterator's outcome when its state's `outcome` ends the loop."""
         return self.final_outcome_map.get(outcome, outcome)
 
-    def fsm_first_of(self, table: Mapping[str, Node]) -> Node | Exit:
+    def fsm_first_of(self, table: Mapping[str, StateNode]) -> StateNode | Exit:
         """Return the node of the state."""
         return table[self._state_label]
 

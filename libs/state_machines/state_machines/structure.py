@@ -12,7 +12,7 @@ from state_machines.state_machine import Iterator as IteratorContainer
 
 
 @dataclass(frozen=True)
-class Edge:
+class PossibleTransition:
     """A transition that a container may take.
 
     Attributes:
@@ -78,16 +78,21 @@ class Structure:
         self.outcomes = sorted(container.get_registered_outcomes())
         self.edges = [
             # What is not bound leads out, also where a state has the outcome's name.
-            Edge(source, outcome, target or outcome, not target or target not in self.states)
+            PossibleTransition(
+                source, outcome, target or outcome, not target or target not in self.states
+            )
             for outcome, source, target in container.get_internal_edges()
         ]
         if isinstance(container, IteratorContainer):
             exhausted, ending = container.exhausted_outcome, container.fsm_ending
-            self.edges += [Edge(label, exhausted, ending(exhausted), True) for label in self.states]
+            self.edges += [
+                PossibleTransition(label, exhausted, ending(exhausted), True)
+                for label in self.states
+            ]
         for branch in branches:
             for outcome, name in sorted(branch.transitions.items()):
                 leaving = name not in self.states and name != RESUME
-                self.edges.append(Edge(branch.label, outcome, name, leaving))
+                self.edges.append(PossibleTransition(branch.label, outcome, name, leaving))
         self.inner: dict[str, Structure] = {}
 
     def walk(self) -> Iterator[Structure]:

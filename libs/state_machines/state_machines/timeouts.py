@@ -17,7 +17,7 @@ from state_machines.exceptions import InvalidTransitionError
 from state_machines.execution import STOPPED, Control, ExecutionThread, stopped_outcome
 from state_machines.frame import Frame
 from state_machines.log import logerr
-from state_machines.program import Node
+from state_machines.program import StateNode
 
 # Watching.
 
@@ -123,7 +123,7 @@ def _abandon_unpreemptible(thread: ExecutionThread) -> None:
     reason = f'ignored a preempt for {thread.control.preempt_timeout:g} s'
     _hold(thread)
     for depth, frame in reversed(list(enumerate(thread.stack))):
-        if not isinstance(frame.current, Node):
+        if not isinstance(frame.current, StateNode):
             return  # It is ending by itself.
         outcome = frame.forced[1] if frame.forced is not None else stopped_outcome(frame.current)
         if outcome is not None:
@@ -185,12 +185,12 @@ def leave_behind(thread: ExecutionThread, depth: int = -1) -> None:
         frame.hold()
     if work is not None:
         thread.control.hanging.append((where, work))
-    if isinstance(inside, Node) and work is not None:
+    if isinstance(inside, StateNode) and work is not None:
         # The request stays with the state, so that the thread left behind ends some time.
         inside.state.request_preempt()
         inside.revoke()
         work.block_reentry(inside)
-    if frames and isinstance(frames[-1].current, Node):
+    if frames and isinstance(frames[-1].current, StateNode):
         frames[-1].left, frames[-1].watch = frames[-1].current, None
         if frames[-1].current is not inside:
             frames[-1].current.revoke()

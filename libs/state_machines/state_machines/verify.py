@@ -24,7 +24,7 @@ from state_machines.container import Container
 from state_machines.exceptions import InvalidStateError, InvalidTransitionError
 from state_machines.state import CBState, State
 from state_machines.state_machine import Iterator as IteratorContainer
-from state_machines.structure import Edge, Structure
+from state_machines.structure import PossibleTransition, Structure
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class _View:
     def __init__(self, structure: Structure, inner: dict[str, _View]) -> None:
         self.structure = structure
         self.inner = inner
-        self.edges: dict[str, list[Edge]] = {label: [] for label in structure.members}
+        self.edges: dict[str, list[PossibleTransition]] = {label: [] for label in structure.members}
         for edge in structure.edges:
             within = self.inner.get(edge.source)
             # Interrupts and unknown labels are held against the states by other checks.

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from state_machines import Container
-from state_machines.structure import Edge, Structure
+from state_machines.structure import PossibleTransition, Structure
 from state_machines.transitions import Transition, TransitionFeed
 
 
@@ -103,5 +103,5 @@ def _check_transition(container: Structure, transition: Transition) -> None:
         # By more than edges: an iterator that was preempted, or an interrupt's state that ended
         # where the container was about to end.
         return
-    elif Edge(left, outcome, target, kind == 'exit') not in container.edges:
+    elif PossibleTransition(left, outcome, target, kind == 'exit') not in container.edges:
         raise AssertionError(f'{what}: {left!r} does not lead to {target!r} by {outcome!r}')

@@ -19,7 +19,7 @@ _COSTMAPS = ('local_costmap', 'global_costmap')
 
 
 @dataclass(frozen=True)
-class Setting:
+class Nav2Setting:
     """One parameter of a node of Nav2.
 
     Attributes:
@@ -34,7 +34,7 @@ class Setting:
     is_new: bool = True
 
 
-def settings(profile: RobotProfile, *, use_sim_time: bool = False) -> Iterator[Setting]:
+def settings(profile: RobotProfile, *, use_sim_time: bool = False) -> Iterator[Nav2Setting]:
     """Yield what a profile says to Nav2 and slam_toolbox."""
     frames, topics, drive = profile.frames, profile.topics, profile.drive
     scan = topics.scans[0]
@@ -44,7 +44,7 @@ def settings(profile: RobotProfile, *, use_sim_time: bool = False) -> Iterator[S
         ('global_frame_id', frames.map),
         ('scan_topic', scan),
     ):
-        yield Setting(('amcl', name), value)
+        yield Nav2Setting(('amcl', name), value)
     for name, value in (
         ('base_frame', frames.base),
         ('odom_frame', frames.odom),
@@ -52,20 +52,20 @@ def settings(profile: RobotProfile, *, use_sim_time: bool = False) -> Iterator[S
         ('scan_topic', scan),
         ('mode', 'mapping'),
     ):
-        yield Setting(('slam_toolbox', name), value)
-    yield Setting(('slam_toolbox', 'resolution'), 0.05)
-    yield Setting(('bt_navigator', 'robot_base_frame'), frames.base)
-    yield Setting(('bt_navigator', 'global_frame'), frames.map)
-    yield Setting(('bt_navigator', 'odom_topic'), topics.odom)
+        yield Nav2Setting(('slam_toolbox', name), value)
+    yield Nav2Setting(('slam_toolbox', 'resolution'), 0.05)
+    yield Nav2Setting(('bt_navigator', 'robot_base_frame'), frames.base)
+    yield Nav2Setting(('bt_navigator', 'global_frame'), frames.map)
+    yield Nav2Setting(('bt_navigator', 'odom_topic'), topics.odom)
     yield from _of_costmaps(profile)
-    yield Setting(('behavior_server', 'robot_base_frame'), frames.base)
-    yield Setting(('behavior_server', 'local_frame'), frames.odom)
-    yield Setting(('behavior_server', 'global_frame'), frames.map)
-    yield Setting(('behavior_server', 'max_rotational_vel'), drive.turn)
+    yield Nav2Setting(('behavior_server', 'robot_base_frame'), frames.base)
+    yield Nav2Setting(('behavior_server', 'local_frame'), frames.odom)
+    yield Nav2Setting(('behavior_server', 'global_frame'), frames.map)
+    yield Nav2Setting(('behavior_server', 'max_rotational_vel'), drive.turn)
     yield from _of_speeds(profile)
-    yield Setting(('collision_monitor', 'base_frame_id'), frames.base)
-    yield Setting(('collision_monitor', 'odom_frame_id'), frames.odom)
-    yield Setting(('collision_monitor', 'cmd_vel_out_topic'), topics.command)
+    yield Nav2Setting(('collision_monitor', 'base_frame_id'), frames.base)
+    yield Nav2Setting(('collision_monitor', 'odom_frame_id'), frames.odom)
+    yield Nav2Setting(('collision_monitor', 'cmd_vel_out_topic'), topics.command)
     stamped = profile.types.command == 'TwistStamped'
     for node in (
         'controller_server',
@@ -74,30 +74,30 @@ def settings(profile: RobotProfile, *, use_sim_time: bool = False) -> Iterator[S
         'collision_monitor',
         'docking_server',
     ):
-        yield Setting((node, 'enable_stamped_cmd_vel'), stamped)
+        yield Nav2Setting((node, 'enable_stamped_cmd_vel'), stamped)
     for node in ('amcl', 'slam_toolbox', 'bt_navigator', 'controller_server', 'planner_server'):
-        yield Setting((node, 'use_sim_time'), use_sim_time)
+        yield Nav2Setting((node, 'use_sim_time'), use_sim_time)
 
 
-def _of_costmaps(profile: RobotProfile) -> Iterator[Setting]:
+def _of_costmaps(profile: RobotProfile) -> Iterator[Nav2Setting]:
     corners = list(zip(profile.body.footprint[::2], profile.body.footprint[1::2], strict=True))
     for name in _COSTMAPS:
         where = (name, name)
-        yield Setting((*where, 'robot_base_frame'), profile.frames.base)
+        yield Nav2Setting((*where, 'robot_base_frame'), profile.frames.base)
         if corners:
             text = ', '.join(f'[{x:g}, {y:g}]' for x, y in corners)
-            yield Setting((*where, 'footprint'), f'[{text}]')
+            yield Nav2Setting((*where, 'footprint'), f'[{text}]')
         else:
-            yield Setting((*where, 'robot_radius'), profile.body.radius)
+            yield Nav2Setting((*where, 'robot_radius'), profile.body.radius)
         for layer in ('obstacle_layer', 'voxel_layer'):
             for index, scan in enumerate(profile.topics.scans):
                 source = 'scan' if index == 0 else f'scan{index + 1}'
-                yield Setting((*where, layer, source, 'topic'), scan, is_new=index > 0)
-    yield Setting(('local_costmap', 'local_costmap', 'global_frame'), profile.frames.odom)
-    yield Setting(('global_costmap', 'global_costmap', 'global_frame'), profile.frames.map)
+                yield Nav2Setting((*where, layer, source, 'topic'), scan, is_new=index > 0)
+    yield Nav2Setting(('local_costmap', 'local_costmap', 'global_frame'), profile.frames.odom)
+    yield Nav2Setting(('global_costmap', 'global_costmap', 'global_frame'), profile.frames.map)
 
 
-def _of_speeds(profile: RobotProfile) -> Iterator[Setting]:
+def _of_speeds(profile: RobotProfile) -> Iterator[Nav2Setting]:
     drive = profile.drive
     plugin = ('controller_server', 'FollowPath')
     for name, value in (
@@ -116,13 +116,13 @@ def _of_speeds(profile: RobotProfile) -> Iterator[Setting]:
         ('acc_lim_theta', drive.turn_acceleration),
         ('decel_lim_theta', -drive.turn_acceleration),
     ):
-        yield Setting((*plugin, name), value, is_new=False)
+        yield Nav2Setting((*plugin, name), value, is_new=False)
     smoother = 'velocity_smoother'
-    yield Setting((smoother, 'max_velocity'), [drive.speed, 0.0, drive.turn])
-    yield Setting((smoother, 'min_velocity'), [-drive.speed, 0.0, -drive.turn])
-    yield Setting((smoother, 'max_accel'), [drive.acceleration, 0.0, drive.turn_acceleration])
-    yield Setting((smoother, 'max_decel'), [-drive.deceleration, 0.0, -drive.turn_acceleration])
-    yield Setting((smoother, 'odom_topic'), profile.topics.odom)
+    yield Nav2Setting((smoother, 'max_velocity'), [drive.speed, 0.0, drive.turn])
+    yield Nav2Setting((smoother, 'min_velocity'), [-drive.speed, 0.0, -drive.turn])
+    yield Nav2Setting((smoother, 'max_accel'), [drive.acceleration, 0.0, drive.turn_acceleration])
+    yield Nav2Setting((smoother, 'max_decel'), [-drive.deceleration, 0.0, -drive.turn_acceleration])
+    yield Nav2Setting((smoother, 'odom_topic'), profile.topics.odom)
 
 
 def laid_over(
