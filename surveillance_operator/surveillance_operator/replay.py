@@ -7,13 +7,14 @@ for example, gets one while it is shown.
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +23,10 @@ from strict_files.suggestions import nearest
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording.runs import Recording, find_recordings, run_parser
-from surveillance_operator.recording.timeline import MARKS, Timeline
+from surveillance_operator.recording.timeline import Timeline
+from surveillance_operator.run_entries import marks_of
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, page_address
+from surveillance_runtime.event_log import MARKS
 from surveillance_runtime.run_files import TIMELINE
 
 if TYPE_CHECKING:
@@ -48,12 +51,22 @@ class Track:
         sights: What lidar and camera saw; None for nothing.
         read: Returns which share of the recording is in the time line, 0 to 1.
         number: Of the line that is shown.
+        marks: When what happened, seconds since 1970, as the log has it; empty: as the page showed.
     """
 
     line: Timeline
     sights: RecordedSights | None = None
     read: Callable[[], float] = lambda: 1.0
     number: int = -1
+    marks: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+    def next_mark(self, kind: str, at: float) -> float | None:
+        """Return when something of a kind happened next after a time; None: nothing did."""
+        if not self.marks:
+            return self.line.next_mark(kind, at)
+        times = self.marks.get(kind, ())
+        later = bisect.bisect_right(times, at + 1e-3)
+        return times[later] if later < len(times) else None
 
 
 class Player:
@@ -160,7 +173,7 @@ class Player:
         if kind not in MARKS:
             raise ValueError(f'{kind!r}: expected {nearest(kind, MARKS)}')
         with self._lock:
-            marks = [each.line.next_mark(kind, self._time) for each in self._tracks.values()]
+            marks = [each.next_mark(kind, self._time) for each in self._tracks.values()]
             at = min((mark for mark in marks if mark is not None), default=None)
             if at is None:
                 raise ValueError(f'no {kind} after this moment')
@@ -291,7 +304,8 @@ def _track(recording: Recording, stack: contextlib.ExitStack) -> Track:
         read = conversion.share
     line = Timeline(path, lambda problem: print(f'replay: {problem}', file=sys.stderr))
     stack.callback(line.close)
-    return Track(line, _sights(recording, stack), read)
+    marks = {} if recording.log is None else marks_of(recording.log)
+    return Track(line, _sights(recording, stack), read, marks=marks)
 
 
 def _sights(recording: Recording, stack: contextlib.ExitStack) -> RecordedSights | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections import Counter
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from floor_plans.facts import counted
+from strict_files.files import FileError
 from surveillance_runtime.event_log import (
     RecordEntry,
     on_one_clock,
@@ -87,6 +89,21 @@ def _old_incidents(path: Path, passed: Counter[str]) -> Iterator[RecordEntry]:
         if lasted is not None:
             more['seconds'] = lasted
         yield RecordEntry('incident', math.nan, {**fields, **more, 'line': number}, at)
+
+
+def marks_of(path: Path) -> dict[str, list[float]]:
+    """Return when what happened that a replay can jump to, seconds since 1970, ascending.
+
+    Args:
+        path: The log; none that tells dates, as of an earlier version, gives nothing.
+    """
+    marks: dict[str, list[float]] = {}
+    with contextlib.suppress(FileError):
+        for entry in read_all(path):
+            is_late = entry.name == 'incident' and entry.text('phase') != 'begin'
+            if entry.kind.mark and entry.at is not None and not is_late:
+                marks.setdefault(entry.kind.mark, []).append(entry.at)
+    return {mark: sorted(times) for mark, times in marks.items()}
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,9 @@ KINDS: Mapping[str, EntryKind] = {
     'end': EntryKind(()),
     'snapshot': EntryKind(('account',)),
     'incident': EntryKind(
-        ('id', 'phase', 'node', 'kind', 'name', 'severity', 'text'), is_of_mission=False
+        ('id', 'phase', 'node', 'kind', 'name', 'severity', 'text'),
+        is_of_mission=False,
+        mark='incident',
     ),
     'finding': EntryKind(
         ('number', 'kind', 'seen', 'place', 'state', 'severity'), is_of_mission=False
@@ -148,6 +150,8 @@ report, the time line of a fleet and the marks of a replay follow from it."""
 
 RECORD, OLD_RECORD = 'events.jsonl', 'mission.jsonl'
 """The log in the folder of a robot's run, and how it was called when it was the mission's alone."""
+MARKS = tuple(kind.mark for kind in KINDS.values() if kind.mark)
+"""What a replay can jump to."""
 SEGMENT_BYTES = 4_000_000
 """Size from which on a log's file is packed away and a new one begun."""
 MOST_WAITING = 4_000_000

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,8 @@ from launcher.run_mission import summary
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator.recording.runs import robots_of
 from surveillance_operator.report import write_report
-from surveillance_operator.run_entries import entries_of_run, incidents_of
-from surveillance_runtime.event_log import RECORD, EventLog, read, record_in
+from surveillance_operator.run_entries import entries_of_run, incidents_of, marks_of
+from surveillance_runtime.event_log import MARKS, RECORD, EventLog, read, record_in
 
 OLD = [
     {'event': 'start', 'time': 0.0, 'machine': 'patrol', 'place': 'E', 'places': ['C1', 'E']},
@@ -73,3 +74,23 @@ def test_what_a_fleet_shares_is_no_robot(tmp_path: Path) -> None:
             log.write('restart', node='armor_server', why='killed by SIGKILL')
     assert robots_of(tmp_path) == {'anna': tmp_path / 'anna'}
     assert read(tmp_path / RECORD)
+
+
+def test_a_replay_jumps_to_what_the_log_tells(tmp_path: Path) -> None:
+    with EventLog(tmp_path / RECORD) as log:
+        log.write('decision', 1.0, place='C1', rule='URGENT', reason='it waits')
+        log.write('incident', 2.0, id='a1', phase='begin', **DOOR)
+        log.write('incident', 9.0, id='a1', phase='end', seconds=7.0, **DOOR)
+        log.write('restart', node='observer', why='exit code 1')
+    written = read(tmp_path / RECORD)
+    assert marks_of(tmp_path / RECORD) == {
+        'decision': [written[0].at],
+        'incident': [written[1].at],
+    }
+    assert marks_of(tmp_path / 'nothing') == {}
+
+
+def test_the_page_has_a_button_for_each_mark() -> None:
+    page = Path(__file__).parents[2] / 'surveillance_operator/surveillance_operator/page/static'
+    buttons = re.findall(r'data-jump="(\w+)"', (page / 'index.html').read_text('utf-8'))
+    assert sorted(buttons) == sorted(MARKS)

@@ -47,12 +47,14 @@ class Recording:
         timeline: Where its time line is, or is to be kept.
         messages: The folder or file of its messages, if there are any.
         is_whole: Whether it has its time line.
+        log: What happened; None: another program recorded it.
     """
 
     name: Path
     timeline: Path
     messages: Path | None
     is_whole: bool
+    log: Path | None = None
 
 
 def find_recordings(name: str, runs: Path) -> dict[str, Recording]:
@@ -82,7 +84,8 @@ def _recorded(folder: Path) -> Recording | None:
     has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
     if not line.is_file() and not has_messages:
         return None
-    return Recording(folder, line, recorded if has_messages else None, line.is_file())
+    messages = recorded if has_messages else None
+    return Recording(folder, line, messages, line.is_file(), record_in(folder))
 
 
 def _foreign(name: Path, messages: Path) -> Recording:

@@ -24,8 +24,8 @@ LEFT_OUT = frozenset({'scan', 'usage'})
 WHOLE_PERIOD = 60.0
 """Seconds between two lines that hold everything."""
 _HEAD = re.compile(rb'\{"t":([\d.]+),"k":([01]),"e":"(\w*)"')
-MARKS = ('decision', 'failure', 'recharge')
-"""What a replay can jump to."""
+SHOWN_MARKS = ('decision', 'failure', 'recharge')
+"""What of `event_log.MARKS` is to be seen on the page, where a recording has no log."""
 
 
 class TimelineWriter:
@@ -82,7 +82,7 @@ class TimelineWriter:
         marks = state.history.marks
         if before is not None and marks and marks != before.history.marks:
             kind = marks[-1][1]
-            return kind if kind in MARKS else 'failure' if kind == 'help' else ''
+            return kind if kind in SHOWN_MARKS else 'failure' if kind == 'help' else ''
         if before is None or state.task.decision_number != before.task.decision_number:
             return 'decision' if state.task.decision is not None else ''
         return ''
@@ -97,7 +97,7 @@ class Timeline:
 
     Attributes:
         times: Of the lines, seconds since 1970, ascending.
-        marks: Times by what happened, one of `MARKS`.
+        marks: Times by what happened, one of `SHOWN_MARKS`.
 
     Raises:
         FileError: There is no such file, or nothing in it.
@@ -107,7 +107,7 @@ class Timeline:
         self._warn = warn
         self._damaged: set[int] = set()
         self.times: list[float] = []
-        self.marks: dict[str, list[float]] = {name: [] for name in MARKS}
+        self.marks: dict[str, list[float]] = {name: [] for name in SHOWN_MARKS}
         self._offsets: list[int] = []
         self._wholes: list[int] = []
         try:
