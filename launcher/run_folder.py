@@ -22,8 +22,7 @@ from launcher.run import NOT_RECORDED, Run
 from strict_files.regular_files import parse_json
 from strict_files.suggestions import like
 from surveillance_runtime.launch_protocol import NotNowError
-
-STATE = 'run.json'
+from surveillance_runtime.run_files import STATE, in_order, run_number
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,8 @@ class RunState:
 
     def __init__(self, folder: Path, options: Mapping[str, Any]) -> None:
         self._options = dict(options)
+        # Who is started last is gone on with, whatever the clock says.
+        self._number = 1 + max(map(run_number, _folders(folder.absolute().parent)), default=0)
         flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
         self._descriptor = os.open(folder / STATE, flags, 0o644)
         try:
@@ -82,7 +83,8 @@ class RunState:
         os.close(self._descriptor)
 
     def _write(self, *, ended: bool) -> None:
-        text = json.dumps({'options': self._options, 'ended': ended}, indent=1) + '\n'
+        content = {'options': self._options, 'ended': ended, 'number': self._number}
+        text = json.dumps(content, indent=1) + '\n'
         os.pwrite(self._descriptor, text.encode(), 0)
         os.ftruncate(self._descriptor, len(text.encode()))
 
@@ -127,13 +129,13 @@ def look_into(folder: Path) -> Found | None:
 
 
 def latest(runs: Path) -> Found | None:
-    """Return the run that began last, None where there is none."""
-    found = (look_into(folder) for folder in sorted(_folders(runs), reverse=True))
+    """Return the run that was started last, None where there is none."""
+    found = (look_into(folder) for folder in reversed(in_order(_folders(runs))))
     return next((each for each in found if each is not None), None)
 
 
 def find(runs: Path, name: str) -> Found:
-    """Return the run of a name (or path), or the one that began last where the name is empty.
+    """Return the run of a name (or path), or the one that was started last where the name is empty.
 
     Raises:
         ValueError: There is none.
@@ -205,7 +207,7 @@ def prune(runs: Path, most: float, chosen: Path) -> list[Path]:
     Returns:
         The deleted folders.
     """
-    known = [folder for folder in sorted(_folders(runs)) if look_into(folder) is not None]
+    known = [folder for folder in in_order(_folders(runs)) if look_into(folder) is not None]
     sizes = {folder: _size(folder) for folder in known}
     total, deleted = sum(sizes.values()), []
     for folder in known[:-1]:

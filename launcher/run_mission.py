@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from floor_plans.writing import copy_place
 from launcher import run_folder
@@ -212,13 +213,21 @@ def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]
         return resume, f'continuing {_short(resume)}'
     found = run_folder.latest(runs) if not run.fresh else None
     if found is not None and not found.ended and not found.running:
-        same = {**found.options, 'seconds': None} == {**run_folder.options_of(run), 'seconds': None}
-        if same:
+        differing = _differing(found.options, run_folder.options_of(run))
+        if not differing:
             how = 'which was not finished; --fresh begins a new one'
             return found.folder, f'continuing {_short(found.folder)}, {how}'
-        left = f'{_short(found.folder)} was started with other options and is not finished'
+        how = f'was started with other options ({differing}) and is not finished'
+        left = f'{_short(found.folder)} {how}'
         return run_folder.make_folder(runs), f'{left}; --resume continues it'
     return run_folder.make_folder(runs), ''
+
+
+def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return which options differ, with what they were; how long it runs does not matter."""
+    names = sorted((before.keys() | now.keys()) - {'seconds'})
+    found = [name for name in names if before.get(name) != now.get(name)]
+    return ', '.join(f'{name} was {before.get(name)}, is {now.get(name)}' for name in found)
 
 
 def _supervised(

@@ -9,7 +9,6 @@ import signal
 import pytest
 
 from launcher.run_folder import (
-    STATE,
     RunState,
     find,
     latest,
@@ -18,6 +17,7 @@ from launcher.run_folder import (
     prune,
 )
 from surveillance_runtime.launch_protocol import NotNowError
+from surveillance_runtime.run_files import STATE, in_order
 
 HOLD = (
     'import sys, signal; from pathlib import Path; from launcher.run_folder import RunState\n'
@@ -65,6 +65,16 @@ def test_a_run_that_came_to_its_end_says_so(tmp_path):
     found = look_into(folder)
     assert found is not None
     assert (found.ended, found.running, found.options) == (True, False, {'mode': 'one'})
+
+
+def test_the_run_that_was_started_last_is_gone_on_with_whatever_its_name_says(tmp_path):
+    begun(tmp_path, '20260102-000000')
+    behind = begun(tmp_path, '19700101-000000', ended=False)  # no battery keeps the clock
+    assert latest(tmp_path).folder == behind
+    first = tmp_path / '20260102-000000'
+    RunState(first, {}).end()  # gone on with
+    assert latest(tmp_path).folder == first
+    assert in_order(tmp_path.iterdir()) == [behind, first]
 
 
 def test_a_killed_launcher_leaves_a_run_that_did_not_end(start, tmp_path):

@@ -10,7 +10,7 @@ from strict_files.suggestions import like
 from surveillance_operator.recording.reading import SUFFIX, files_of
 from surveillance_runtime.command_line import CommandParser
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.run_files import LAUNCH_LOG, PLACE, RECORDING, TIMELINE
+from surveillance_runtime.run_files import LAUNCH_LOG, PLACE, RECORDING, TIMELINE, in_order
 
 LAST = 'last'
 
@@ -21,7 +21,7 @@ def find_run(name: str, runs: Path) -> Path:
     Raises:
         FileError: There is none.
     """
-    known = sorted(path.name for path in runs.glob('*') if is_run(path))
+    known = [path.name for path in in_order(path for path in runs.glob('*') if is_run(path))]
     if name == LAST:
         if not known:
             raise FileError(f'no run in {runs} yet')
