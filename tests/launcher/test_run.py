@@ -359,8 +359,8 @@ def test_an_unfinished_run_of_other_options_is_told_at_the_start(tmp_path):
     folder, how = chosen_folder(Run(mode='MANUAL'), tmp_path, None)
     assert folder != old
     assert how.endswith(
-        f'{old.name} was started with other options (mode was None, is MANUAL) and is not finished; '
-        '--resume continues it'
+        f'{old.name} was started with other options (mode was None, is MANUAL) and is not '
+        'finished; --resume continues it'
     )
     assert chosen_folder(Run(mode='MANUAL', fresh=True), tmp_path, None)[1] == ''
 
