@@ -11,11 +11,17 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from lidar_navigation.driving.driving import Drive, State
-from lidar_navigation.driving.navigator import Navigator
-from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation import (
+    Drive,
+    DriveParameters,
+    DriveState,
+    GridPlanner,
+    Navigator,
+    NoPathError,
+    PlanningParameters,
+    Velocity,
+)
 from lidar_navigation.geometry import Points, Scan
-from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 from surveillance_simulation.robot.robot import Robot
 
 PERIOD = 0.1
@@ -118,7 +124,7 @@ class DrivenRobot:
             self.navigator.task = drive
             while not drive.state.ended and not until():
                 self.look()
-                if drive.state is State.ASKING:
+                if drive.state is DriveState.ASKING:
                     try:
                         drive.new_path(self.path_to(goal))
                     except NoPathError as error:

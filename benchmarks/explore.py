@@ -27,9 +27,7 @@ from benchmarks.whole_stack import ROOT
 from floor_plans import Grid
 from floor_plans.facts import graph_over_doors
 from floor_plans.occupancy_grid import distance_to
-from lidar_navigation.exploration.exploration import Exploration, Phase
-from lidar_navigation.exploration.frontiers import FrontierParameters
-from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation import Exploration, FrontierParameters, MapBuilder, Phase
 from lidar_navigation.geometry import Pose, Scan, composed, relative
 from surveillance_simulation.robot.base import BaseModel
 from surveillance_simulation.robot.lidar import LidarModel

@@ -30,8 +30,8 @@ from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import Grid
 from floor_plans.occupancy_grid import distance_to
+from lidar_navigation import Localiser
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map, relative
-from lidar_navigation.localisation.localisation import Localiser
 from lidar_navigation.localisation.odometry import OdometryBuffer, joined
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place

@@ -47,11 +47,8 @@ from benchmarks.whole_stack import ROOT, Stack, ros_arguments
 from floor_plans import Grid
 from launcher.run import Run
 from launcher.run_processes import command, node_environ
-from lidar_navigation import geometry
-from lidar_navigation.driving.driving import Drive, State
-from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation import Drive, DriveState, GridPlanner, Navigator, PlanningParameters, geometry
 from lidar_navigation.geometry import Scan
-from lidar_navigation.planning.grid_planning import GridPlanner, PlanningParameters
 from patrol_policy.battery import PERCENTILE_99
 from surveillance_behaviour.experience import LegTimes
 from surveillance_runtime import node_table
@@ -291,11 +288,11 @@ def among_people(model: PeopleModel, seconds: float, seed: int, place: str) -> D
             result.failed[drive] += 1
             continue
         result.recoveries += drive.recoveries
-        if drive.state is State.FAILED:
+        if drive.state is DriveState.FAILED:
             result.failed[drive.reason.split('(')[0]] += 1
         assert driven.navigator.pose is not None
         in_room = world.place_at(*driven.navigator.pose[:2]) == room
-        result.arrived += drive.state is State.ARRIVED and in_room
+        result.arrived += drive.state is DriveState.ARRIVED and in_room
     result.steps_ms = driven.steps_ms
     result.hours = robot.time / 3600
     result.contacts, result.metres = robot.base.collisions, robot.base.travelled

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.driven_robot import DrivenRobot
 from benchmarks.localisation import Amcl, print_table
 from benchmarks.sizes import sized_parser, skip
-from lidar_navigation.driving.driving import State
+from lidar_navigation import DriveState
 from lidar_navigation.geometry import Pose, Scan, composed, relative
 from lidar_navigation.localisation.odometry import OdometryBuffer
 from surveillance_simulation.optional_mujoco import mujoco
@@ -83,7 +83,7 @@ def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
         outcome.drives += 1
         if isinstance(drive, str):
             outcome.failed[drive] += 1
-        elif drive.state is State.ARRIVED and world.place_at(*robot.base.pose[:2]) == room:
+        elif drive.state is DriveState.ARRIVED and world.place_at(*robot.base.pose[:2]) == room:
             outcome.arrived += 1
         else:
             outcome.failed[drive.reason.split('(')[0] or 'in another room'] += 1

@@ -35,9 +35,8 @@ from floor_plans import Grid
 from indoor_watch.events import EventBook
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.watcher import Watcher
-from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation import Localiser, MapBuilder
 from lidar_navigation.geometry import Pose, Scan
-from lidar_navigation.localisation.localisation import Localiser
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.simulated_place import read_simulated_place
 

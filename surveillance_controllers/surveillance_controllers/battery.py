@@ -77,7 +77,7 @@ class BatteryParameters:
             )
 
 
-class Battery:
+class BatteryModel:
     """The charge of one battery.
 
     Args:
@@ -210,7 +210,7 @@ class BatteryInUse:
 
     def __init__(
         self,
-        battery: Battery,
+        battery: BatteryModel,
         stations: Mapping[str, Station],
         dock_reach: float,
         since: float | None,

@@ -26,7 +26,7 @@ from trajectory_msgs.msg import JointTrajectory
 from floor_plans.parameters import stations_in
 from state_machines.ros import ClockWait
 from surveillance_controllers import conversions, stimuli
-from surveillance_controllers.battery import Battery, BatteryInUse
+from surveillance_controllers.battery import BatteryInUse, BatteryModel
 from surveillance_controllers.battery_driver import DrivenBattery, doubt
 from surveillance_controllers.controller_parameters import (
     STATION_NOT_GIVEN,
@@ -71,7 +71,7 @@ class BatteryController(PatrolNode):
         self._kept = StateFile(self, self._settings.state_file)
         kept = self._kept.number('level')
         level = self._settings.initial_value if kept is None else min(100.0, max(0.0, kept))
-        self._battery = Battery(self._settings.model, level)
+        self._battery = BatteryModel(self._settings.model, level)
         self._wait = ClockWait(self)
         self._lock = threading.RLock()
         self._said: tuple[int, bool] | None = None
@@ -198,7 +198,7 @@ class RobotBattery:
         self,
         node: PatrolNode,
         settings: BatterySettings,
-        battery: Battery,
+        battery: BatteryModel,
         change: Callable[[Callable[[], None]], None],
         since: float | None = None,
     ) -> None:

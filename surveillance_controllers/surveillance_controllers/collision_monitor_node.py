@@ -28,14 +28,13 @@ from std_srvs.srv import SetBool
 
 from floor_plans import Zones
 from floor_plans.parameters import zones_from
+from lidar_navigation import Footprint, Velocity
 from lidar_navigation.driving.path_following import (
-    Velocity,
     as_forwards,
     room_ahead,
     safe_turn,
     speed_to_stop,
 )
-from lidar_navigation.footprint import Footprint
 from lidar_navigation.geometry import Points, Pose, Scan, composed
 from lidar_navigation.robot_base import robot_deceleration, robot_footprint, robot_radius
 from strict_files.settings import parameter

@@ -137,7 +137,7 @@ def battery_settings(
 
 
 @dataclass(frozen=True)
-class Environment:
+class MapLimits:
     """The limits within which the planner plans, metres, world frame."""
 
     x_min: float
@@ -157,8 +157,8 @@ class Environment:
 class PlannerSettings(PeerSettings):
     """What `planner_controller` is told by its parameters; units as declared."""
 
-    environment: Environment = converted(
-        lambda limits: Environment(*limits),
+    environment: MapLimits = converted(
+        lambda limits: MapLimits(*limits),
         [-1000.0, 1000.0, -1000.0, 1000.0],
         'Limits of the place: [x_min, x_max, y_min, y_max], metres, world frame.',
         name='environment_size',

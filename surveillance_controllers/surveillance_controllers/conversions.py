@@ -16,13 +16,13 @@ from nav_msgs.msg import Path as PathMessage
 from sensor_msgs.msg import BatteryState
 
 from floor_plans.occupancy_map import MOST_CELLS
+from lidar_navigation import Velocity
 from lidar_navigation.geometry import Points
-from surveillance_controllers.battery import Battery
+from surveillance_controllers.battery import BatteryModel
 from surveillance_runtime.conversions import map_from, point_message
 
 if TYPE_CHECKING:
     from floor_plans import Grid
-    from lidar_navigation.driving.path_following import Velocity
 
 
 def array_from_points(points: Iterable[Point]) -> Points:
@@ -41,7 +41,7 @@ def path_from_array(array: Points, stamp: Any, frame: str = 'map') -> PathMessag
     return message
 
 
-def battery_state(battery: Battery, *, charging: bool) -> BatteryState:
+def battery_state(battery: BatteryModel, *, charging: bool) -> BatteryState:
     """Return a battery's charge as the message that ROS has for it; the caller stamps it."""
     p = battery.parameters
     message = BatteryState()

@@ -24,14 +24,19 @@ from sensor_msgs.msg import LaserScan
 
 from floor_plans import Grid
 from floor_plans.occupancy_map import write_map
-from lidar_navigation.driving.path_following import DriveParameters, Velocity
-from lidar_navigation.exploration.exploration import Exploration, Phase
-from lidar_navigation.exploration.foreign_map import ForeignMap
-from lidar_navigation.exploration.frontiers import FrontierParameters
-from lidar_navigation.exploration.map_building import MapBuilder, MappingParameters
+from lidar_navigation import (
+    DriveParameters,
+    Exploration,
+    ForeignMap,
+    FrontierParameters,
+    MapBuilder,
+    MappingParameters,
+    Phase,
+    PlanningParameters,
+    Velocity,
+)
 from lidar_navigation.geometry import Pose, Scan, composed, relative
 from lidar_navigation.localisation.odometry import ContinuousOdometry, OdometryBuffer, joined
-from lidar_navigation.planning.grid_planning import PlanningParameters
 from state_machines.ros import ClockWait
 from strict_files.files import FileError, in_one_line, replace_text
 from strict_files.settings import parameter

@@ -21,7 +21,7 @@ from surveillance_controllers.manual import commands
 from surveillance_controllers.manual.commands import MOTION, ParsedCommand
 from surveillance_controllers.manual.requests import CommandConsole
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import Motion, MotionFailedError, place_reached
+from surveillance_controllers.motion.arrival import BaseMotion, MotionFailedError, place_reached
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.stimuli import glide
@@ -53,7 +53,7 @@ class MotionController(PatrolNode):
         reach = self._settings.place_reach
         state_file = self._settings.state_file
         self._recorder = PlaceRecorder(self, self._knowledge, reach, start, state_file)
-        self._robot: Motion | None = None
+        self._robot: BaseMotion | None = None
         if self._settings.drives:
             self._robot = self._make_robot()
         else:
@@ -64,7 +64,7 @@ class MotionController(PatrolNode):
         if self._mode == 'MANUAL' and self._settings.console:
             self._console.open(console_source)
 
-    def _make_robot(self) -> Motion:
+    def _make_robot(self) -> BaseMotion:
         """Return the way to move that the parameters ask for."""
         # Only here, for the libraries behind it take their time to import.
         from surveillance_controllers.motion.nav2 import DockingMotion, Nav2Motion
@@ -72,7 +72,7 @@ class MotionController(PatrolNode):
 
         settings = self._settings
         kind = Nav2Motion if settings.navigator == 'nav2' else NavigationMotion
-        motion: Motion = kind(self, self._knowledge, self._recorder, settings)
+        motion: BaseMotion = kind(self, self._knowledge, self._recorder, settings)
         return motion if settings.docking == 'none' else DockingMotion(self, motion, settings)
 
     def _carry_out(self, command: ParsedCommand) -> str:

@@ -19,8 +19,8 @@ from surveillance_controllers.manual.commands import (
     MOTION,
     PLANNER,
     STATUS,
-    Argument,
     Command,
+    CommandArgument,
     CommandError,
     Grammar,
     ParsedCommand,
@@ -42,12 +42,14 @@ LIMIT = 10_000.0
 """Coordinates are within this many metres."""
 
 
-def _word(name: str, expected: str, known: Callable[..., Iterable[str]] = lambda: ()) -> Argument:
-    return Argument(name, expected, str, known=known)
+def _word(
+    name: str, expected: str, known: Callable[..., Iterable[str]] = lambda: ()
+) -> CommandArgument:
+    return CommandArgument(name, expected, str, known=known)
 
 
-def _rest(name: str, expected: str) -> Argument:
-    return Argument(name, expected, str.split, takes_rest=True)
+def _rest(name: str, expected: str) -> CommandArgument:
+    return CommandArgument(name, expected, str.split, takes_rest=True)
 
 
 _DOOR = _word('DOOR', 'a door like D1')
@@ -116,7 +118,7 @@ def _get_parameter(actions: MissionActions, node: str, name: str) -> str:
     )
 
 
-def _command(words: str, text: str, do: Do, *arguments: Argument) -> tuple[Command, Do]:
+def _command(words: str, text: str, do: Do, *arguments: CommandArgument) -> tuple[Command, Do]:
     return Command(tuple(words.split()), arguments, text), do
 
 
@@ -235,7 +237,7 @@ _COMMANDS = (
         'Set a parameter of a running node.',
         lambda a, *given: a.set_parameter(*given),
         *(_NODE, _word('NAME', 'a parameter', _live)),
-        Argument('VALUE', 'a value', str, takes_rest=True, known=_choices),
+        CommandArgument('VALUE', 'a value', str, takes_rest=True, known=_choices),
     ),
     _command('known', 'Show what is known of a place, with its proofs.', _known, _PLACE),
 )

@@ -44,9 +44,9 @@ from indoor_watch.viewpoints import Viewpoints
 from indoor_watch.watch_rules import DEFAULT_RULES, Level, read_watch_file
 from indoor_watch.watcher import MOST_CELLS, Look, Watcher, same_map
 from indoor_watch.ways import Ways
+from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import Scan, composed, relative
 from lidar_navigation.localisation.odometry import OdometryBuffer
-from lidar_navigation.localisation.place_locator import PlaceLocator
 from lidar_navigation.robot_base import robot_radius
 from marker_detection.camera_model import CameraModel
 from state_machines import Interrupt

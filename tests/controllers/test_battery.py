@@ -7,7 +7,7 @@ import math
 import pytest
 
 from floor_plans import Station
-from surveillance_controllers.battery import Battery, BatteryInUse, BatteryParameters
+from surveillance_controllers.battery import BatteryInUse, BatteryModel, BatteryParameters
 from surveillance_runtime.robot_arm import TrajectoryPoint
 
 PARAMETERS = BatteryParameters(
@@ -20,8 +20,8 @@ PARAMETERS = BatteryParameters(
 )
 
 
-def in_use(level: float = 50.0) -> tuple[Battery, BatteryInUse]:
-    battery = Battery(PARAMETERS, level)
+def in_use(level: float = 50.0) -> tuple[BatteryModel, BatteryInUse]:
+    battery = BatteryModel(PARAMETERS, level)
     return battery, BatteryInUse(battery, {'E': Station((1.0, 0.0, 0.0))}, 0.5, since=0.0)
 
 
@@ -123,7 +123,7 @@ def test_a_station_that_was_moved_charges_where_it_is_now() -> None:
 
 
 def test_a_station_with_a_rate_charges_by_it() -> None:
-    battery = Battery(PARAMETERS, 10.0)
+    battery = BatteryModel(PARAMETERS, 10.0)
     stations = {'E': Station((1.0, 0.0, 0.0), 30.0), 'W': Station((9.0, 0.0, 0.0))}
     use = BatteryInUse(battery, stations, 0.5, since=0.0)
     use.see_pose((1.0, 0.5, 0.0), 0.0)
@@ -138,10 +138,10 @@ def test_a_station_with_a_rate_charges_by_it() -> None:
 def test_a_day_away_is_counted_and_a_longer_time_is_another_clock() -> None:
     parameters = BatteryParameters(capacity=100.0, rest_power=1.0)
     for passed, drawn in ((86_400.0, 24.0), (86_401.0, 0.0), (0.0, 0.0), (-1.0, 0.0)):
-        battery = Battery(parameters)
+        battery = BatteryModel(parameters)
         BatteryInUse(battery, {}, 0.5, since=50.0).advance(50.0 + passed)
         assert battery.energy == pytest.approx(100.0 - drawn)
-    battery = Battery(parameters)
+    battery = BatteryModel(parameters)
     use = BatteryInUse(battery, {}, 0.5, since=None)
     use.advance(5000.0)
     assert battery.level == 100, 'when time first passes nothing was drawn'

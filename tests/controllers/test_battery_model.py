@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surveillance_controllers.battery import Battery, BatteryParameters
+from surveillance_controllers.battery import BatteryModel, BatteryParameters
 
 LEVELS = st.floats(0, 100)
 TIMES = st.floats(0, 100_000)
 
 
 def test_an_hour_at_rest_takes_the_rest_power_as_watt_hours() -> None:
-    battery = Battery(BatteryParameters(capacity=50, rest_power=10))
+    battery = BatteryModel(BatteryParameters(capacity=50, rest_power=10))
     assert battery.draw(3600) == pytest.approx(10)
     assert battery.level == pytest.approx(80)
 
@@ -22,14 +22,14 @@ def test_driving_turning_and_equipment_each_add_their_own_energy() -> None:
     parameters = BatteryParameters(
         capacity=1, rest_power=0, joules_per_metre=36, joules_per_radian=18, equipment_power=3.6
     )
-    battery = Battery(parameters)
+    battery = BatteryModel(parameters)
     assert battery.draw(1, metres=1) == pytest.approx(0.01)
     assert battery.draw(1, radians=1) == pytest.approx(0.005)
     assert battery.draw(10, equipment_seconds=10) == pytest.approx(0.01)
 
 
 def test_percent_says_100_only_when_full_and_0_in_the_last_percent() -> None:
-    battery = Battery(BatteryParameters(), 99.9)
+    battery = BatteryModel(BatteryParameters(), 99.9)
     assert battery.percent == 99
     battery.set_level(100)
     assert battery.percent == 100
@@ -42,7 +42,7 @@ def test_percent_says_100_only_when_full_and_0_in_the_last_percent() -> None:
 def test_a_battery_never_gives_more_than_it_holds(
     level: float, seconds: float, metres: float, radians: float
 ) -> None:
-    battery = Battery(BatteryParameters(), level)
+    battery = BatteryModel(BatteryParameters(), level)
     before = battery.energy
     taken = battery.draw(seconds, metres, radians)
     assert battery.energy >= 0
@@ -54,7 +54,7 @@ def test_a_battery_never_gives_more_than_it_holds(
 def test_charging_in_two_steps_is_charging_in_one(
     level: float, first: float, second: float
 ) -> None:
-    twice, once = Battery(BatteryParameters(), level), Battery(BatteryParameters(), level)
+    twice, once = BatteryModel(BatteryParameters(), level), BatteryModel(BatteryParameters(), level)
     twice.charge(first)
     twice.charge(second)
     once.charge(first + second)
@@ -70,7 +70,7 @@ def test_the_last_fifth_charges_slower_than_the_first() -> None:
             seconds += 1
         return seconds
 
-    battery = Battery(BatteryParameters(), 0)
+    battery = BatteryModel(BatteryParameters(), 0)
     to_20 = seconds_to(20)
     battery.set_level(80)
     assert seconds_to(100) > 2 * to_20
@@ -96,7 +96,7 @@ def test_bad_sizes_are_named(values: dict[str, float], text: str) -> None:
 
 
 def test_negative_amounts_are_refused() -> None:
-    battery = Battery(BatteryParameters())
+    battery = BatteryModel(BatteryParameters())
     with pytest.raises(ValueError, match='negative amount'):
         battery.draw(-1)
     with pytest.raises(ValueError, match='expected 0 or more'):
@@ -125,7 +125,7 @@ def test_the_closed_form_is_the_course_that_small_steps_take(
     level: float, seconds: float, rate: float | None
 ) -> None:
     parameters = BatteryParameters(capacity=20.0, charging_power=300.0, taper_from=0.8)
-    battery = Battery(parameters, level)
+    battery = BatteryModel(parameters, level)
     battery.charge(seconds, rate)
     expected = integrated(level, seconds, parameters, rate)
     assert battery.level == pytest.approx(expected, abs=0.15)
@@ -133,7 +133,7 @@ def test_the_closed_form_is_the_course_that_small_steps_take(
 
 
 def test_the_station_gives_less_as_the_battery_fills() -> None:
-    battery = Battery(BatteryParameters(charging_power=600.0, taper_from=0.8, taper_floor=0.1))
+    battery = BatteryModel(BatteryParameters(charging_power=600.0, taper_from=0.8, taper_floor=0.1))
     powers = []
     for level in (0, 79.9, 80, 90, 97, 98, 99.9, 100):
         battery.set_level(level)
@@ -143,7 +143,7 @@ def test_the_station_gives_less_as_the_battery_fills() -> None:
 
 def test_whole_percent_are_those_that_were_set() -> None:
     for capacity in (40.0, 7.3, 0.9):
-        battery = Battery(BatteryParameters(capacity=capacity))
+        battery = BatteryModel(BatteryParameters(capacity=capacity))
         for level in range(101):
             battery.set_level(level)
             assert battery.percent == level
@@ -154,7 +154,7 @@ def test_whole_percent_are_those_that_were_set() -> None:
 
 
 def test_the_voltage_is_a_line_between_empty_and_full() -> None:
-    battery = Battery(BatteryParameters(empty_voltage=18.0, full_voltage=25.0), 0.0)
+    battery = BatteryModel(BatteryParameters(empty_voltage=18.0, full_voltage=25.0), 0.0)
     assert battery.voltage == 18.0
     battery.set_level(50)
     assert battery.voltage == 21.5
@@ -185,7 +185,7 @@ def test_sizes_on_the_edge_are_taken_and_the_others_are_not() -> None:
 
 
 def test_nothing_used_takes_nothing() -> None:
-    battery = Battery(BatteryParameters(), 50)
+    battery = BatteryModel(BatteryParameters(), 50)
     assert battery.draw(0) == 0
     battery.charge(0)
     assert battery.level == 50

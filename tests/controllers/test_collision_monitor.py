@@ -11,16 +11,14 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
 
-from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation import Velocity
 from surveillance_controllers import collision_monitor_node
 from surveillance_controllers.collision_monitor_node import (
     CollisionMonitor,
-    MonitorSettings,
-    allowed,
 )
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 
-ROBOT = MonitorSettings(radius=0.25, margin=0.05, deceleration=0.8)
+ROBOT = collision_monitor_node.MonitorSettings(radius=0.25, margin=0.05, deceleration=0.8)
 
 
 def wall(x: float) -> np.ndarray:
@@ -30,22 +28,26 @@ def wall(x: float) -> np.ndarray:
 @pytest.mark.parametrize('way', [1.0, -1.0])
 def test_the_speed_is_what_the_robot_can_brake_from(way: float) -> None:
     for gap in (0.0, 0.05, 0.2, 0.5):
-        found = allowed(Velocity(way, 0.2), wall(way * (0.3 + gap)), ROBOT)
+        found = collision_monitor_node.allowed(Velocity(way, 0.2), wall(way * (0.3 + gap)), ROBOT)
         assert abs(found.speed) <= math.sqrt(2 * 0.8 * gap) + 0.1
         assert found.speed * way >= 0.0
         if found.speed:
             assert found.turn / found.speed == pytest.approx(0.2 / way), 'the same arc'
     free = Velocity(way, 0.2)
-    assert allowed(free, wall(-way * 0.35), ROBOT) == free, 'what is behind does not matter'
-    assert allowed(free, np.zeros((0, 2)), ROBOT) == free
-    assert allowed(Velocity(0.0, 1.0), wall(0.26), ROBOT) == Velocity(0.0, 1.0)
+    assert collision_monitor_node.allowed(free, wall(-way * 0.35), ROBOT) == free, (
+        'what is behind does not matter'
+    )
+    assert collision_monitor_node.allowed(free, np.zeros((0, 2)), ROBOT) == free
+    assert collision_monitor_node.allowed(Velocity(0.0, 1.0), wall(0.26), ROBOT) == Velocity(
+        0.0, 1.0
+    )
 
 
 def test_a_command_drives_into_nothing() -> None:
     # Simulated: a command that never changes, a wall, a base that obeys with limited braking.
     at, speed = 0.0, 0.0
     for _ in range(400):
-        wanted = allowed(Velocity(1.5, 0.0), wall(3.0 - at), ROBOT).speed
+        wanted = collision_monitor_node.allowed(Velocity(1.5, 0.0), wall(3.0 - at), ROBOT).speed
         speed = min(wanted, speed + 0.08) if wanted > speed else max(wanted, speed - 0.08)
         at += 0.1 * speed / 2
     assert 3.0 - at >= 0.25
@@ -161,3 +163,16 @@ def test_no_command_enters_a_keep_out_zone_or_is_fast_in_a_slow_one(graph: Any) 
     graph.until(lambda: at(1.74) == 0.5)
     places.publish(String(data='{"keep_out_zones": {"Z": [1]}}'))
     graph.until(lambda: at(-2.0) == 0.5)
+
+
+def test_a_long_robot_whose_corners_swing_out_turns_slower() -> None:
+    long = (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)
+    beside = np.array([[0.42, 0.32]])
+    settings = collision_monitor_node.MonitorSettings(footprint=long)
+    assert collision_monitor_node.allowed(Velocity(0.0, 1.0), beside, settings).turn < 0.9
+    assert collision_monitor_node.allowed(Velocity(0.0, -1.0), beside, settings) == Velocity(
+        0.0, -1.0
+    )
+    slow = collision_monitor_node.allowed(Velocity(0.3, 1.5), beside, settings)
+    assert slow.speed < 0.25
+    assert slow.turn == pytest.approx(5 * slow.speed)

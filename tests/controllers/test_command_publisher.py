@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation import Velocity
 from surveillance_controllers.motion.command_publisher import (
     LEAD,
     REACTION,

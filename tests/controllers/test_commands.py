@@ -15,8 +15,8 @@ from surveillance_controllers.manual.commands import (
     LONGEST_LINE,
     MOTION,
     PLANNER,
-    Argument,
     Command,
+    CommandArgument,
     CommandError,
     Grammar,
     ParsedCommand,
@@ -234,8 +234,8 @@ def test_arguments_propose_what_is_known_after_those_before() -> None:
     command = Command(
         ('door', 'open'),
         (
-            Argument('ROOM', 'a room', str, known=lambda: ('Hall', 'R1', 'R2')),
-            Argument('DOOR', 'a door', str, known=lambda room: (f'{room}-D1',)),
+            CommandArgument('ROOM', 'a room', str, known=lambda: ('Hall', 'R1', 'R2')),
+            CommandArgument('DOOR', 'a door', str, known=lambda room: (f'{room}-D1',)),
         ),
         'Open a door.',
     )

@@ -14,10 +14,10 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import BatteryState, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
-from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation import Velocity
 from lidar_navigation.geometry import Mount
 from surveillance_controllers import conversions
-from surveillance_controllers.battery import Battery, BatteryParameters
+from surveillance_controllers.battery import BatteryModel, BatteryParameters
 from surveillance_runtime.conversions import (
     cloud_from_points,
     point_message,
@@ -173,7 +173,7 @@ def test_a_velocity_is_a_twist() -> None:
     ],
 )
 def test_a_battery_s_state_is_told(level: float, charging: bool, status: int) -> None:
-    battery = Battery(BatteryParameters(), level)
+    battery = BatteryModel(BatteryParameters(), level)
     state = conversions.battery_state(battery, charging=charging)
     assert state.percentage == pytest.approx(level / 100)
     assert state.power_supply_status == status

@@ -16,12 +16,9 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformSt
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from lidar_navigation import Drive, Localiser, Navigator, Spin, Velocity
 from lidar_navigation.driving import driving
-from lidar_navigation.driving.driving import Drive, Spin
-from lidar_navigation.driving.navigator import Navigator
-from lidar_navigation.driving.path_following import Velocity
 from lidar_navigation.geometry import Mount, Scan, composed
-from lidar_navigation.localisation.localisation import Localiser
 from state_machines import Interrupt
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.motion.arrival import MotionFailedError

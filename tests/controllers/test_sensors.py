@@ -9,7 +9,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from sensor_msgs.msg import LaserScan
 
-from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation import Navigator
 from lidar_navigation.geometry import Pose
 from surveillance_runtime.conversions import seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode

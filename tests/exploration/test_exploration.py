@@ -10,16 +10,16 @@ import pytest
 
 from benchmarks import regular_places
 from floor_plans import Grid
-from lidar_navigation.exploration.exploration import Exploration, Phase
-from lidar_navigation.exploration.foreign_map import ForeignMap
-from lidar_navigation.exploration.frontiers import (
+from lidar_navigation import (
+    Exploration,
+    ForeignMap,
     FrontierParameters,
-    find_frontiers,
-    frontier_cells,
+    GridPlanner,
+    MapBuilder,
+    Phase,
 )
-from lidar_navigation.exploration.map_building import MapBuilder
+from lidar_navigation.exploration.frontiers import find_frontiers, frontier_cells
 from lidar_navigation.geometry import Scan
-from lidar_navigation.planning.grid_planning import GridPlanner
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.simulated_place import SimulatedPlace
 

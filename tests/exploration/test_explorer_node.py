@@ -15,7 +15,7 @@ from sensor_msgs.msg import LaserScan
 from benchmarks import regular_places
 from floor_plans import Grid
 from floor_plans.occupancy_map import read_map
-from lidar_navigation.exploration.exploration import Phase
+from lidar_navigation import Phase
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE, Explorer
 from surveillance_runtime.conversions import map_message, pose_estimate, pose_message
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from lidar_navigation import MapBuilder
 from lidar_navigation.exploration.evidence_grid import EvidenceGrid
-from lidar_navigation.exploration.map_building import MapBuilder
-from lidar_navigation.exploration.pose_graph import Edge, PoseGraph
+from lidar_navigation.exploration.pose_graph import Constraint, PoseGraph
 from lidar_navigation.exploration.scan_matching import Matcher, surface_of
 from lidar_navigation.geometry import Pose, Scan, composed, relative
 from surveillance_simulation.robot.lidar import LidarModel, scan
@@ -88,16 +88,16 @@ def ring(count: int, rng: np.random.Generator) -> PoseGraph:
         x, y, yaw = relative(true[number], true[number + 1])
         error = rng.normal(0.0, (0.05, 0.05, 0.02))
         step = (x + float(error[0]), y + float(error[1]), yaw + float(error[2]))
-        edges.append(Edge(number, number + 1, step, information))
+        edges.append(Constraint(number, number + 1, step, information))
         poses.append(composed(poses[-1], step))
     closing = relative(true[-1], true[0])
-    edges.append(Edge(count - 1, 0, closing, 100 * information, may_be_wrong=True))
+    edges.append(Constraint(count - 1, 0, closing, 100 * information, may_be_wrong=True))
     return PoseGraph(poses, edges)
 
 
 def test_a_loop_takes_the_error_out_of_the_whole_ring() -> None:
     graph = ring(60, np.random.default_rng(1))
-    loop = graph.edges[-1]
+    loop = graph.constraints[-1]
 
     def gap() -> float:
         back = relative(graph.poses[loop.first], graph.poses[loop.second])
@@ -115,7 +115,7 @@ def test_a_wrong_loop_among_right_ones_loses() -> None:
     graph.optimise()
     right = list(graph.poses)
     information = np.diag([4e4, 4e4, 2.5e5])
-    graph.edges.append(Edge(10, 40, (1.0, 0.0, 0.0), information, may_be_wrong=True))
+    graph.constraints.append(Constraint(10, 40, (1.0, 0.0, 0.0), information, may_be_wrong=True))
     graph.optimise()
     off = [math.dist(one[:2], other[:2]) for one, other in zip(graph.poses, right, strict=True)]
     assert max(off) < 0.5

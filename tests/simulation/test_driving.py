@@ -9,11 +9,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from lidar_navigation import geometry
-from lidar_navigation.driving.driving import Drive, State
-from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation import Drive, DriveState, GridPlanner, Navigator, NoPathError, geometry
 from lidar_navigation.geometry import Scan
-from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import PeopleModel
 from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
@@ -85,7 +82,7 @@ def driven(world: SimulatedPlace, seed: int, goals: list[str]) -> tuple[Robot, f
             robot.advance(0.1)
             here = np.array(robot.base.pose[:2])
             furthest = max(furthest, float(np.hypot(*(line - here).T).min()))
-        assert drive.state is State.ARRIVED, drive.reason
+        assert drive.state is DriveState.ARRIVED, drive.reason
     return robot, furthest
 
 

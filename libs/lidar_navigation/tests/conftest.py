@@ -1,6 +1,9 @@
-"""Hypothesis draws the same examples in each run, without deadlines."""
+"""Hypothesis draws the same examples in each run, without deadlines; a flat with a lidar."""
 
 import hypothesis
+import pytest
+
+from lidar_navigation.testing import Flat
 
 hypothesis.settings.register_profile(
     'alone',
@@ -10,3 +13,9 @@ hypothesis.settings.register_profile(
 )
 if hypothesis.settings.get_current_profile_name() == 'default':
     hypothesis.settings.load_profile('alone')
+
+
+@pytest.fixture
+def flat() -> Flat:
+    """Two rooms and a lidar in them."""
+    return Flat()

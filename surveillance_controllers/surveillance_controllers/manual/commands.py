@@ -33,7 +33,7 @@ class CommandError(ValueError):
 
 
 @dataclass(frozen=True)
-class Argument:
+class CommandArgument:
     """One typed value of a command.
 
     Attributes:
@@ -56,7 +56,7 @@ class Command:
     """Fixed words, the arguments after them, and a sentence for the help."""
 
     words: tuple[str, ...]
-    arguments: tuple[Argument, ...]
+    arguments: tuple[CommandArgument, ...]
     description: str
 
     @property
@@ -78,7 +78,7 @@ class ParsedCommand:
     values: tuple[object, ...] = ()
 
 
-def integer(name: str, low: int, high: int) -> Argument:
+def integer(name: str, low: int, high: int) -> CommandArgument:
     """Return an argument that is a whole number from `low` to `high`."""
 
     def read(text: str) -> int:
@@ -86,10 +86,10 @@ def integer(name: str, low: int, high: int) -> Argument:
             raise ValueError
         return int(text)
 
-    return Argument(name, f'a whole number from {low} to {high}', read)
+    return CommandArgument(name, f'a whole number from {low} to {high}', read)
 
 
-def number(name: str, low: float, high: float, unit: str) -> Argument:
+def number(name: str, low: float, high: float, unit: str) -> CommandArgument:
     """Return an argument that is a real number from `low` to `high`."""
 
     def read(text: str) -> float:
@@ -98,12 +98,14 @@ def number(name: str, low: float, high: float, unit: str) -> Argument:
             raise ValueError
         return value
 
-    return Argument(name, f'a number from {low:.10g} to {high:.10g} ({unit})', read)
+    return CommandArgument(name, f'a number from {low:.10g} to {high:.10g} ({unit})', read)
 
 
-def points(name: str) -> Argument:
+def points(name: str) -> CommandArgument:
     """Return an argument that is a list of points, `[[x, y, z], ...]`, possibly empty."""
-    return Argument(name, 'a list of points as [[x, y, z], ...]', _read_points, takes_rest=True)
+    return CommandArgument(
+        name, 'a list of points as [[x, y, z], ...]', _read_points, takes_rest=True
+    )
 
 
 def _real(text: str) -> float:

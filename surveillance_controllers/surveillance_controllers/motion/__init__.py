@@ -1,7 +1,7 @@
 """The ways to move a robot, and what is told of it; the computing is `lidar_navigation`'s.
 
-- `arrival` says what a way to move the robot offers (`Motion`). There are `navigation_motion`, with
-  a navigator of its own, and `nav2`, which has the docking at the end of either, too;
+- `arrival` says what a way to move the robot offers (`BaseMotion`). There are `navigation_motion`,
+  with a navigator of its own, and `nav2`, which has the docking at the end of either, too;
 - `command_publisher` publishes velocities, as fast as the age of the last messages allows;
 - `place_recording` tells the robot's place.
 

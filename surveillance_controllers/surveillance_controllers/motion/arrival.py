@@ -13,7 +13,7 @@ from state_machines.ros import GoalRun
 from surveillance_controllers.manual import commands
 
 
-class Motion(Protocol):
+class BaseMotion(Protocol):
     """What drives the robot: `NavigationMotion`, `Nav2Motion`, either with docking."""
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:

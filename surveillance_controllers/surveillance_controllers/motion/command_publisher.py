@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable
 
 from geometry_msgs.msg import Twist, TwistStamped
 
-from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation import Velocity
 from surveillance_controllers import conversions
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.parameters import CommandSettings

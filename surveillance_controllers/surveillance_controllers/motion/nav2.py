@@ -25,6 +25,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 
 from floor_plans.parameters import station_at, stations_in
+from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import (
     Points,
     angle_between,
@@ -34,13 +35,12 @@ from lidar_navigation.geometry import (
     point_of,
     points_passed,
 )
-from lidar_navigation.localisation.place_locator import PlaceLocator
 from state_machines import Interrupt
 from state_machines.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import Motion, MotionFailedError, expect_place
+from surveillance_controllers.motion.arrival import BaseMotion, MotionFailedError, expect_place
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
@@ -288,7 +288,7 @@ class DockingMotion:
         ParameterError: nav2_msgs is not installed.
     """
 
-    def __init__(self, node: PatrolNode, inner: Motion, settings: MotionSettings) -> None:
+    def __init__(self, node: PatrolNode, inner: BaseMotion, settings: MotionSettings) -> None:
         self._node = node
         self._inner = inner
         self._settings = settings

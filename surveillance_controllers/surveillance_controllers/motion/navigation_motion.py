@@ -19,11 +19,16 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from floor_plans.parameters import zones_from
-from lidar_navigation.driving.driving import TURNED, Drive, Spin, State
-from lidar_navigation.driving.navigator import Navigator
-from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation import (
+    Drive,
+    DriveParameters,
+    DriveState,
+    Navigator,
+    NoPathError,
+    Spin,
+    Velocity,
+)
 from lidar_navigation.geometry import Points, Pose, Scan, point_of
-from lidar_navigation.planning.grid_planning import NoPathError
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, GoalRun
 from surveillance_controllers import conversions
@@ -170,11 +175,13 @@ class NavigationMotion:
         interrupt = run.interrupt
         with self._carrying_out(drive, interrupt, lambda pose: report(point_of(pose))):
             while not drive.state.ended and not interrupt.is_set():
-                self._await(lambda: drive.state.ended or drive.state is State.ASKING, interrupt)
-                if drive.state is State.ASKING and not interrupt.is_set():
+                self._await(
+                    lambda: drive.state.ended or drive.state is DriveState.ASKING, interrupt
+                )
+                if drive.state is DriveState.ASKING and not interrupt.is_set():
                     self._find_another_path(drive, path[-1], run)
         end = point_of(self._navigator.pose or (float('nan'),) * 3)
-        if drive.state is State.FAILED:
+        if drive.state is DriveState.FAILED:
             raise MotionFailedError(drive.reason, end)
         self._recorder.tell(self._navigator.place_at(end) if self._is_sure else None)
         return end
@@ -189,7 +196,7 @@ class NavigationMotion:
         with self._carrying_out(spin, run.interrupt):
             self._await(lambda: spin.done, run.interrupt)
         end = point_of(self._navigator.pose or (float('nan'),) * 3)
-        if spin.done and abs(spin.left) > TURNED:
+        if spin.done and not spin.has_turned:
             short = math.degrees(abs(spin.left))
             raise MotionFailedError(f'the robot cannot turn: {short:.0f} degrees are left', end)
         return end

@@ -17,8 +17,8 @@ from sensor_msgs.msg import PointCloud2
 
 from floor_plans import Grid
 from floor_plans.parameters import zones_from
+from lidar_navigation import GridPlanner, NoPathError, PlanningParameters
 from lidar_navigation.geometry import Points, Pose, point_of
-from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 from state_machines import Interrupt
 from state_machines.ros import GoalAbortedError, GoalRun
 from surveillance_controllers import conversions

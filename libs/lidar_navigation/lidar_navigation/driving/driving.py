@@ -29,7 +29,7 @@ from lidar_navigation.geometry import Points, Pose, angle_between, composed
 from lidar_navigation.localisation.tracking import Mover
 
 
-class State(Enum):
+class DriveState(Enum):
     """What a drive is doing."""
 
     DRIVING = 'driving'
@@ -44,7 +44,7 @@ class State(Enum):
     @property
     def ended(self) -> bool:
         """Whether the drive is over."""
-        return self in (State.ARRIVED, State.FAILED)
+        return self in (DriveState.ARRIVED, DriveState.FAILED)
 
 
 @dataclass(frozen=True)
@@ -95,10 +95,10 @@ SPIN_PATIENCE = 4.0
 """A turn on the spot that does not go on for so long ends, seconds: a robot that is not round may
 have no room for it."""
 
-TURNED = 0.1
+_TURNED = 0.1
 """A turn that ends so near to its bearing, rad, has got there."""
 
-_RECOVERIES = (State.WAITING, State.BACKING, State.LOOKING)
+_RECOVERIES = (DriveState.WAITING, DriveState.BACKING, DriveState.LOOKING)
 """What is tried one after the other; after each, another path is asked for."""
 
 
@@ -126,7 +126,7 @@ class Drive:
         self._recovery = recovery or RecoveryParameters()
         self._follower = PathFollower(path, self._robot)
         self._local = SampledPlanner(self._robot)
-        self.state = State.DRIVING
+        self.state = DriveState.DRIVING
         self.reason = ''
         self.recoveries = 0
         self._level = 0
@@ -175,21 +175,21 @@ class Drive:
             self._lost_since = None
         elif not self.state.ended:
             return self._while_lost(now, seen, dt)
-        if self.state is State.DRIVING:
+        if self.state is DriveState.DRIVING:
             return self._drive(now, pose, seen, movers, dt)
-        if self.state is State.STOPPING:
+        if self.state is DriveState.STOPPING:
             if (moved <= _STANDS and abs(turned) <= _STANDS) or now - self._since > 3.0:
-                self.state = State.ARRIVED
+                self.state = DriveState.ARRIVED
             return Velocity()
-        if self.state is State.WAITING and now - self._since >= self._recovery.wait:
-            self._begin(State.ASKING, now)
-        elif self.state is State.BACKING:
+        if self.state is DriveState.WAITING and now - self._since >= self._recovery.wait:
+            self._begin(DriveState.ASKING, now)
+        elif self.state is DriveState.BACKING:
             self._backed += moved
             return self._back(now, seen)
-        elif self.state is State.LOOKING:
+        elif self.state is DriveState.LOOKING:
             self._turned += abs(turned)
             if self._turned >= math.tau or now - self._since > 20.0:
-                self._begin(State.ASKING, now)
+                self._begin(DriveState.ASKING, now)
             else:
                 return Velocity(0.0, min(self._robot.turn, 1.0))
         return self._follower.halt(seen, dt)
@@ -200,7 +200,7 @@ class Drive:
         A path that was found in spite of an obstacle is followed up to there: it may go away.
         """
         self._obstacles = obstacles
-        if self.state is State.DRIVING and self._now is not None:
+        if self.state is DriveState.DRIVING and self._now is not None:
             before, self._through = self._through, self._is_through()
             if self._through and not before:
                 self._ask(self._now, 'something is on the path ahead')
@@ -214,14 +214,14 @@ class Drive:
         """Go on along another path."""
         self._follower = PathFollower(path, self._robot)
         self._through = self._is_through()
-        self.state = State.DRIVING
+        self.state = DriveState.DRIVING
         self._blocked_since = self._mark = None
         self._best = 0.0
 
     def no_path(self, reason: str) -> None:
         """Say that no other path was found; the drive tries the next recovery."""
         self.reason = reason
-        if self.state is State.ASKING and self._now is not None:
+        if self.state is DriveState.ASKING and self._now is not None:
             self._recover(self._now, reason)
 
     def _while_lost(self, now: float, seen: Points, dt: float) -> Velocity:
@@ -235,7 +235,7 @@ class Drive:
         if lost_for < r.stand_lost + r.look_lost:
             return Velocity(0.0, 0.5)
         self.reason = 'the robot does not know where it is: what it sees is nowhere on the map'
-        self.state = State.FAILED
+        self.state = DriveState.FAILED
         return Velocity()
 
     def _motion(self, pose: Pose) -> tuple[float, float]:
@@ -262,7 +262,7 @@ class Drive:
         guidance = self._guided(pose, seen, movers, dt)
         if guidance.done:
             self._since = now
-            self.state = State.STOPPING
+            self.state = DriveState.STOPPING
             return guidance.velocity
         if guidance.off_path > (2 * r.off_path if movers else r.off_path):
             self._ask(now, f'the robot is {guidance.off_path:.2f} m off its path')
@@ -307,7 +307,7 @@ class Drive:
         elif self._level >= len(_RECOVERIES):
             among_people = now - self._moved_at <= r.people_leave
             if not among_people or now - self._trouble_since >= r.people_patience:
-                self.state = State.FAILED
+                self.state = DriveState.FAILED
                 return
             self._level = 1
         self.recoveries += 1
@@ -322,9 +322,9 @@ class Drive:
             self._recover(now, reason)
             return
         self.recoveries += 1
-        self._begin(State.ASKING, now)
+        self._begin(DriveState.ASKING, now)
 
-    def _begin(self, state: State, now: float) -> None:
+    def _begin(self, state: DriveState, now: float) -> None:
         self.state = state
         self._since = now
         self._turned = self._backed = 0.0
@@ -336,7 +336,7 @@ class Drive:
         room = room_ahead(behind, 0.0, self._robot.body.turned_round, self._robot.margin, 1.0)
         slow = r.back_speed**2 / (2 * self._robot.acceleration) + 0.02
         if self._backed >= r.back_up or room <= slow or now - self._since > 10.0:
-            self._begin(State.ASKING, now)
+            self._begin(DriveState.ASKING, now)
             return Velocity()
         return Velocity(-r.back_speed, 0.0)
 
@@ -363,6 +363,11 @@ class Spin:
         if self._last is None:
             return False
         return self._is_stuck or (self.left if self._bearing is None else abs(self.left)) <= 0.02
+
+    @property
+    def has_turned(self) -> bool:
+        """Whether it is near enough to its bearing to have got there."""
+        return abs(self.left) <= _TURNED
 
     @property
     def left(self) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 
 from floor_plans import Grid
 from floor_plans.occupancy_grid import distance_to
-from lidar_navigation.driving.driving import Drive, Spin, State
+from lidar_navigation.driving.driving import Drive, DriveState, Spin
 from lidar_navigation.driving.path_following import DriveParameters, Velocity
 from lidar_navigation.exploration.frontiers import Frontier, FrontierParameters, find_frontiers
 from lidar_navigation.geometry import Points, Pose, Scan, composed, in_map, relative
@@ -237,10 +237,10 @@ class Exploration:
         task = self._task
         driving = isinstance(task, Drive) and not task.state.ended
         if isinstance(task, Drive) and self.goal is not None:
-            if task.state is State.FAILED:
+            if task.state is DriveState.FAILED:
                 self._give_up(self.goal, task.reason)
                 changed = True
-            elif task.state is State.ARRIVED:
+            elif task.state is DriveState.ARRIVED:
                 if not self._looked:
                     self._looked, self._arrived_at = True, self._now
                     changed = False
@@ -252,7 +252,7 @@ class Exploration:
                 if self._part_left(self.goal) > _SEEN_ENOUGH:
                     self._give_up(self.goal, _BLIND_SPOT)
                 changed = True
-            elif task.state is State.ASKING and not self._plan(self.goal.viewpoint):
+            elif task.state is DriveState.ASKING and not self._plan(self.goal.viewpoint):
                 return
         if driving and not changed:
             return
@@ -325,7 +325,7 @@ class Exploration:
         except NoPathError as error:
             self.reason = str(error)
             with self._lock:
-                if isinstance(self._task, Drive) and self._task.state is State.ASKING:
+                if isinstance(self._task, Drive) and self._task.state is DriveState.ASKING:
                     self._task.no_path(self.reason)
                     return not self._task.state.ended
             return False
@@ -341,11 +341,11 @@ class Exploration:
     def _return(self, changed: bool) -> None:
         task = self._task
         if isinstance(task, Drive) and task.state.ended:
-            self.reason = task.reason if task.state is State.FAILED else ''
+            self.reason = task.reason if task.state is DriveState.FAILED else ''
             if math.dist(self._here[:2], self.builder.start[:2]) <= _FOUND_AT_HOME:
                 self.reason = ''
             self.phase = Phase.DONE
             return
-        wants = not isinstance(task, Drive) or task.state is State.ASKING or changed
+        wants = not isinstance(task, Drive) or task.state is DriveState.ASKING or changed
         if wants and not self._plan(None) and not isinstance(self._task, Drive):
             self.phase = Phase.DONE

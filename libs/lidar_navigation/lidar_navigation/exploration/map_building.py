@@ -18,7 +18,7 @@ import numpy as np
 
 from floor_plans import Grid
 from lidar_navigation.exploration.evidence_grid import EvidenceGrid
-from lidar_navigation.exploration.pose_graph import Edge, PoseGraph
+from lidar_navigation.exploration.pose_graph import Constraint, PoseGraph
 from lidar_navigation.exploration.scan_matching import (
     Matcher,
     MatchingParameters,
@@ -190,8 +190,8 @@ class MapBuilder:
         else:
             pose, information = found.pose, found.information
         self.graph.poses.append(pose)
-        self.graph.edges.append(
-            Edge(last, last + 1, relative(self.graph.poses[last], pose), information)
+        self.graph.constraints.append(
+            Constraint(last, last + 1, relative(self.graph.poses[last], pose), information)
         )
 
     def _near_in_graph(self, number: int) -> list[int]:
@@ -259,8 +259,8 @@ class MapBuilder:
             or math.dist(found.pose[:2], pose[:2]) > window + 0.1
         ):
             return False
-        self.graph.edges.append(
-            Edge(
+        self.graph.constraints.append(
+            Constraint(
                 nearest,
                 last,
                 relative(self.graph.poses[nearest], found.pose),

@@ -32,7 +32,7 @@ _SMALL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Edge:
+class Constraint:
     """What was measured between two poses.
 
     Attributes:
@@ -56,16 +56,16 @@ class PoseGraph:
 
     Attributes:
         poses: x, y in metres and yaw in rad.
-        edges: What was measured.
+        constraints: What was measured between them (edges of the graph).
     """
 
     poses: list[Pose] = field(default_factory=list)
-    edges: list[Edge] = field(default_factory=list)
+    constraints: list[Constraint] = field(default_factory=list)
 
     def neighbours(self) -> dict[int, list[tuple[int, float]]]:
         """Return the poses to which each one has an edge, and the length of that, metres."""
         found: dict[int, list[tuple[int, float]]] = {i: [] for i in range(len(self.poses))}
-        for edge in self.edges:
+        for edge in self.constraints:
             length = math.hypot(*edge.step[:2])
             found[edge.first].append((edge.second, length))
             found[edge.second].append((edge.first, length))
@@ -73,13 +73,13 @@ class PoseGraph:
 
     def optimise(self) -> float:
         """Move the poses to where the edges agree best; return the greatest move, metres."""
-        if len(self.poses) < 2 or not self.edges:
+        if len(self.poses) < 2 or not self.constraints:
             return 0.0
-        first = np.array([edge.first for edge in self.edges])
-        second = np.array([edge.second for edge in self.edges])
-        measured = np.array([edge.step for edge in self.edges])
-        information = np.array([edge.information for edge in self.edges])
-        loops = np.array([edge.may_be_wrong for edge in self.edges])
+        first = np.array([edge.first for edge in self.constraints])
+        second = np.array([edge.second for edge in self.constraints])
+        measured = np.array([edge.step for edge in self.constraints])
+        information = np.array([edge.information for edge in self.constraints])
+        loops = np.array([edge.may_be_wrong for edge in self.constraints])
         poses = np.array(self.poses)
         before = poses.copy()
         for number in range(_ROUNDS):

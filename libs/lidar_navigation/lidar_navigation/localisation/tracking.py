@@ -1,8 +1,8 @@
 """What moves around the robot: seen by the lidar, told apart, and followed over time.
 
-Points that the map does not explain are grouped into bodies. Each body is followed with a constant
+Points that the map does not explain are grouped into bodies. Each track is followed with a constant
 velocity by an alpha-beta filter (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to
-Tracking and Navigation", 6.5). A body that has moved, and moves, is a `Mover`; one that stands
+Tracking and Navigation", 6.5). A track that has moved, and moves, is a `Mover`; one that stands
 becomes an obstacle like any other.
 """
 
@@ -20,7 +20,7 @@ from lidar_navigation.geometry import Points, Pose
 
 @dataclass(frozen=True)
 class Mover:
-    """A body that moves: a round one of `radius` metres.
+    """A track that moves: a round one of `radius` metres.
 
     Attributes:
         x: Its centre, metres, map frame.
@@ -44,16 +44,16 @@ class TrackingParameters:
     Attributes:
         reach: Points further away than this are not taken, metres.
         gap: Neighbouring points further apart than this belong to two bodies, metres.
-        widest: What is wider than this is no body that walks, metres.
-        thinnest: A body is taken to be no thinner than this, as a radius, metres.
-        gate: How far from where it is expected a body is looked for, metres.
+        widest: What is wider than this is no track that walks, metres.
+        thinnest: A track is taken to be no thinner than this, as a radius, metres.
+        gate: How far from where it is expected a track is looked for, metres.
         position_gain: Part of the difference that corrects a position (alpha).
         velocity_gain: Part of the difference that corrects a velocity (beta).
-        moving_from: A body this fast moves, m/s.
+        moving_from: A track this fast moves, m/s.
         moved: It must have moved this far since it was first seen, metres.
-        settle: Younger than this, nobody knows yet whether a body moves, seconds.
-        keep: A body that is not seen is followed for this long, seconds.
-        standing: A body slower than `moving_from` for this long stands, seconds.
+        settle: Younger than this, nobody knows yet whether a track moves, seconds.
+        keep: A track that is not seen is followed for this long, seconds.
+        standing: A track slower than `moving_from` for this long stands, seconds.
     """
 
     reach: float = 5.0
@@ -71,7 +71,7 @@ class TrackingParameters:
 
 
 @dataclass
-class _Body:
+class _TrackedBody:
     at: Points
     velocity: Points
     radius: float
@@ -86,7 +86,7 @@ class Tracker:
 
     def __init__(self) -> None:
         self._parameters = TrackingParameters()
-        self._bodies: list[_Body] = []
+        self._tracks: list[_TrackedBody] = []
         self._now = -math.inf
 
     @property
@@ -94,25 +94,25 @@ class Tracker:
         """The bodies that move."""
         return [
             Mover(
-                *(float(body.at[0]), float(body.at[1])),
-                *(float(body.velocity[0]), float(body.velocity[1])),
-                body.radius,
+                *(float(track.at[0]), float(track.at[1])),
+                *(float(track.velocity[0]), float(track.velocity[1])),
+                track.radius,
             )
-            for body in self._bodies
-            if self._moves(body)
+            for track in self._tracks
+            if self._moves(track)
         ]
 
     def may_move(self, points: Points) -> NDArray[np.bool_]:
-        """Tell which points, shape (n, 2), map frame, belong to a body that is not known to stand.
+        """Tell which points, shape (n, 2), map frame, belong to a track that is not known to stand.
 
         Returns:
             Shape (n,).
         """
         found = np.zeros(len(points), dtype=np.bool_)
-        for body in self._bodies:
-            if self._moves(body) or self._now - body.since < self._parameters.settle:
-                gaps = np.hypot(points[:, 0] - body.at[0], points[:, 1] - body.at[1])
-                found |= gaps <= body.radius + self._parameters.gap / 2
+        for track in self._tracks:
+            if self._moves(track) or self._now - track.since < self._parameters.settle:
+                gaps = np.hypot(points[:, 0] - track.at[0], points[:, 1] - track.at[1])
+                found |= gaps <= track.radius + self._parameters.gap / 2
         return found
 
     def update(self, pose: Pose, points: Points, now: float) -> None:
@@ -125,18 +125,18 @@ class Tracker:
         """
         dt, self._now = now - self._now, now
         if dt > self._parameters.keep:
-            self._bodies.clear()
-        for body in self._bodies:
-            body.at = body.at + body.velocity * dt
+            self._tracks.clear()
+        for track in self._tracks:
+            track.at = track.at + track.velocity * dt
         seen = self._grouped(np.array(pose[:2]), points)
         self._associate(seen, dt, now)
-        self._bodies = [b for b in self._bodies if now - b.seen <= self._parameters.keep]
+        self._tracks = [b for b in self._tracks if now - b.seen <= self._parameters.keep]
 
-    def _moves(self, body: _Body) -> bool:
-        return self._now - body.fast_at <= self._parameters.standing
+    def _moves(self, track: _TrackedBody) -> bool:
+        return self._now - track.fast_at <= self._parameters.standing
 
     def _grouped(self, robot: Points, points: Points) -> list[tuple[Points, float]]:
-        """Return centre and radius of each body in sight."""
+        """Return centre and radius of each track in sight."""
         p = self._parameters
         away = np.hypot(*(points - robot).T)
         points = points[away <= p.reach]
@@ -145,7 +145,7 @@ class Tracker:
         steps = np.hypot(*np.diff(points, axis=0, append=points[:1]).T)
         groups = np.split(points, np.flatnonzero(steps[:-1] > p.gap) + 1)
         if len(groups) > 1 and steps[-1] <= p.gap:
-            # The first ray looks backwards: a body there is cut in two.
+            # The first ray looks backwards: a track there is cut in two.
             groups[0] = np.concatenate([groups.pop(), groups[0]])
         found = []
         for group in groups:
@@ -162,35 +162,37 @@ class Tracker:
         return found
 
     def _associate(self, seen: Sequence[tuple[Points, float]], dt: float, now: float) -> None:
-        """Give each body the nearest thing seen; what is left over is new."""
+        """Give each track the nearest thing seen; what is left over is new."""
         p = self._parameters
         pairs = sorted(
-            (float(math.dist(body.at, at)), index, which)
-            for index, body in enumerate(self._bodies)
+            (float(math.dist(track.at, at)), index, which)
+            for index, track in enumerate(self._tracks)
             for which, (at, _) in enumerate(seen)
         )
-        free_bodies, left = set(range(len(self._bodies))), set(range(len(seen)))
+        free_tracks, left = set(range(len(self._tracks))), set(range(len(seen)))
         for gap, index, which in pairs:
             if gap > p.gate:
                 break
-            if index in free_bodies and which in left:
-                free_bodies.remove(index)
+            if index in free_tracks and which in left:
+                free_tracks.remove(index)
                 left.remove(which)
-                self._correct(self._bodies[index], *seen[which], dt, now)
+                self._correct(self._tracks[index], *seen[which], dt, now)
         for which in left:
             at, radius = seen[which]
-            self._bodies.append(_Body(at, np.zeros(2), radius, at, now, now))
+            self._tracks.append(_TrackedBody(at, np.zeros(2), radius, at, now, now))
 
-    def _correct(self, body: _Body, at: Points, radius: float, dt: float, now: float) -> None:
+    def _correct(
+        self, track: _TrackedBody, at: Points, radius: float, dt: float, now: float
+    ) -> None:
         p = self._parameters
-        off = at - body.at
-        body.at = body.at + p.position_gain * off
+        off = at - track.at
+        track.at = track.at + p.position_gain * off
         if dt > 0:
-            body.velocity = body.velocity + p.velocity_gain / dt * off
-        body.radius += 0.3 * (radius - body.radius)
-        body.seen = now
-        fast = float(np.hypot(*body.velocity)) >= p.moving_from
-        if fast and math.dist(body.at, body.first_at) >= p.moved:
-            body.fast_at = now
+            track.velocity = track.velocity + p.velocity_gain / dt * off
+        track.radius += 0.3 * (radius - track.radius)
+        track.seen = now
+        fast = float(np.hypot(*track.velocity)) >= p.moving_from
+        if fast and math.dist(track.at, track.first_at) >= p.moved:
+            track.fast_at = now
         elif not fast:
-            body.first_at = body.at
+            track.first_at = track.at

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from floor_plans import Door
 from floor_plans.parameters import zones_from
-from lidar_navigation.driving.driving import Drive, State
-from lidar_navigation.driving.navigator import Navigator
+from lidar_navigation import Drive, DriveState, Navigator, Velocity
 from lidar_navigation.driving.obstacle_memory import ObstacleMemory
-from lidar_navigation.driving.path_following import Velocity
 from lidar_navigation.geometry import Scan, composed
 from lidar_navigation.localisation.localisation import _Rival
 from lidar_navigation.localisation.place_locator import PlaceRegions
-from lidar_navigation.planning.grid_planning import NoPathError
-from surveillance_controllers.planning.door_watch import DoorWatch
-from surveillance_controllers.planning.map_planner import route
 
 PERIOD = 0.6
 """Of a slow lidar, seconds: who is out of sight for longer is not followed."""
@@ -86,7 +79,7 @@ def test_a_drive_through_the_door_changes_the_place_once(flat: Any, navigator: N
             break
         true = composed(true, (velocity.speed * 0.1, 0.0, velocity.turn * 0.1))
         navigator.move(true)
-    assert navigator.task.state is State.ARRIVED
+    assert navigator.task.state is DriveState.ARRIVED
     assert places == ['A', 'B']
     assert true[:2] == pytest.approx((5.5, 1.5), abs=0.12)
 
@@ -131,7 +124,7 @@ def test_an_obstacle_on_the_path_makes_the_drive_ask(flat: Any, navigator: Navig
     for moment in (1.0, 1.3, 1.6):
         navigator.see(flat.scan(true, [(2.6, 1.5, 0.15)]), moment)
     assert navigator.obstacles_changed
-    assert navigator.task.state is State.ASKING
+    assert navigator.task.state is DriveState.ASKING
     gaps = np.hypot(*(navigator.obstacles - (2.6, 1.5)).T)
     assert len(gaps) > 3
     assert np.abs(gaps - 0.15).max() < 0.1
@@ -179,11 +172,11 @@ def test_a_clock_that_begins_anew_lets_obstacles_come_to_stay_and_drives_go_on(
     assert len(navigator.obstacles) > 3
     assert not navigator.obstacles_stay.any()
     navigator.task.no_path('a box')
-    assert navigator.task.state is State.WAITING
+    assert navigator.task.state is DriveState.WAITING
     for step in range(53):
         navigator.see(scan, PERIOD * step)
     assert navigator.obstacles_stay.sum() > 3
-    assert navigator.task.state is not State.WAITING
+    assert navigator.task.state is not DriveState.WAITING
 
 
 def test_scans_of_a_second_lidar_that_come_late_do_not_hurry_time(
@@ -326,45 +319,6 @@ def test_places_in_one_region_are_told_apart_by_their_points(flat: Any) -> None:
     assert regions.place_at((4.5, 1.5)) == 'B'
 
 
-def test_a_door_s_segment_lies_along_its_yaw() -> None:
-    assert Door('D', 1, 2, math.pi / 2, 1.2).segment == pytest.approx((1, 1.4, 1, 2.6))
-
-
-DOORS = {'D1': {'R1', 'C1'}, 'D2': {'C1', 'C2'}, 'D3': {'C2', 'R1'}, 'D4': {'C2', 'R2'}}
-POINTS = {'R1': (0, 0), 'C1': (2, 0), 'C2': (4, 0), 'R2': (6, 0)}
-
-
-def test_the_shortest_route_over_open_doors_is_taken() -> None:
-    assert route(DOORS, [], 'R1', 'R2', POINTS) == ['D3', 'D4']
-    assert route(DOORS, ['D3'], 'R1', 'R2', POINTS) == ['D1', 'D2', 'D4']
-    assert route(DOORS, [], 'R1', 'R1', POINTS) == []
-
-
-@pytest.mark.parametrize(
-    ('closed', 'goal', 'text'),
-    [
-        (['D4'], 'R2', 'no route from R1 to R2: the door D4 is closed'),
-        (['D3', 'D1', 'D4'], 'R2', 'no route from R1 to R2: the doors D3, D4 are closed'),
-        ([], 'R9', 'no route from R1 to R9: no doors lead there'),
-    ],
-)
-def test_without_a_route_the_closed_doors_are_named(
-    closed: list[str], goal: str, text: str
-) -> None:
-    with pytest.raises(NoPathError) as caught:
-        route(DOORS, closed, 'R1', goal, POINTS)
-    assert str(caught.value) == text
-
-
-def test_a_door_whose_room_was_taken_from_the_map_is_not_closed_by_that(graph: Any) -> None:
-    stub: Any = SimpleNamespace(connect=lambda interrupt: interrupt.wait())
-    doors = DoorWatch(graph.node, {'D1': (0, 0, 1, 0), 'D2': (0, 0, 1, 0)}, stub, 1.0)
-    assert doors.closed({'D1': {'C', 'R'}, 'D2': {'C', 'E'}}) == set()
-    assert doors.closed({'D1': {'C', 'R'}, 'D2': {'C'}, 'D3': {'E'}}) == {'D2'}, 'E is still there'
-    assert doors.closed({'D1': {'C'}, 'D2': {'C', 'E'}}) == set(), 'R is not'
-    assert doors.closed({}) == set(), 'nothing is known'
-
-
 def test_a_drive_obeys_zones(flat: Any) -> None:
     """The straight way is barred, and the way round leads through a slow zone."""
     zones = zones_from(
@@ -386,12 +340,12 @@ def test_a_drive_obeys_zones(flat: Any) -> None:
         if true[0] < 1.55:
             assert velocity.speed <= 0.16
         fastest = max(fastest, velocity.speed)
-        if navigator.task.state is not State.DRIVING:
+        if navigator.task.state is not DriveState.DRIVING:
             break
         true = composed(true, (velocity.speed * 0.1, 0.0, velocity.turn * 0.1))
         navigator.move(true)
     assert fastest > 0.2, 'outside it drives on faster'
-    assert navigator.task.state is State.WAITING, 'the zone stands in the way'
+    assert navigator.task.state is DriveState.WAITING, 'the zone stands in the way'
     assert 2.2 - true[0] >= 0.22
 
 

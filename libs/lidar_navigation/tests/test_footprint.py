@@ -11,15 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from floor_plans import Grid
-from lidar_navigation.driving.driving import Drive, State
-from lidar_navigation.driving.navigator import Navigator
-from lidar_navigation.driving.path_following import DriveParameters, Velocity, room_ahead, safe_turn
+from lidar_navigation import (
+    DriveParameters,
+    Footprint,
+    GridPlanner,
+    NoPathError,
+    PlanningParameters,
+    Velocity,
+)
+from lidar_navigation.driving.path_following import room_ahead, safe_turn
 from lidar_navigation.driving.sampled_planning import SampledPlanner, is_safe
-from lidar_navigation.footprint import Footprint
-from lidar_navigation.geometry import Scan
 from lidar_navigation.localisation.tracking import Mover
-from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
-from surveillance_controllers.collision_monitor_node import MonitorSettings, allowed
 
 LONG = (0.5, 0.2, -0.3, 0.2, -0.3, -0.2, 0.5, -0.2)
 """0.8 m long, 0.4 m wide; its wheels are 0.3 m before its rear."""
@@ -57,12 +59,6 @@ def test_its_corners_swing_out_in_a_turn() -> None:
     assert safe_turn(1.0, beside, BODY, 0.02, 3.0, 0.15) < 0.9
     assert safe_turn(-1.0, beside, BODY, 0.02, 3.0, 0.15) == 1.0
     assert safe_turn(1.0, beside, Footprint(0.2), 0.02, 3.0, 0.15) == 1.0
-    settings = MonitorSettings(footprint=LONG)
-    assert allowed(Velocity(0.0, 1.0), beside, settings).turn < 0.9
-    assert allowed(Velocity(0.0, -1.0), beside, settings) == Velocity(0.0, -1.0)
-    slow = allowed(Velocity(0.3, 1.5), beside, settings)
-    assert slow.speed < 0.25
-    assert slow.turn == pytest.approx(5 * slow.speed)
 
 
 def corridor(width: float, corner: bool) -> Grid:
@@ -106,37 +102,3 @@ def test_among_people_it_keeps_its_whole_length_from_them() -> None:
     for _ in range(5):
         velocity = local.step(path, walls, [Mover(2.5, 0.0, 0.5, 0.0, 0.2)], velocity, 0.1)
     assert velocity.speed > 0.1
-
-
-def test_a_long_robot_drives_through_doors_of_a_foreign_physics_without_a_contact(
-    seven_rooms_world: object,
-) -> None:
-    pytest.importorskip('mujoco')
-    from surveillance_simulation.physics.model import PhysicsModel
-    from surveillance_simulation.robot.base import BaseModel
-    from surveillance_simulation.robot.robot import Robot
-    from surveillance_simulation.world.simulated_place import SimulatedPlace
-
-    world = seven_rooms_world
-    assert isinstance(world, SimulatedPlace)
-    physics = PhysicsModel(footprint=LONG, friction=0.5, sweep=0.0)
-    robot = Robot(world, BaseModel(radius=BODY.circumscribed), physics=physics)
-    grid = world.plan.grid()
-    paths, parameters = planner(grid, LONG), DriveParameters(footprint=LONG)
-    navigator = Navigator()
-    navigator.set_map(grid)
-    goal = world.plan.place.positions['R1'][:2]
-    drive = Drive(paths.plan(robot.base.pose[:2], goal), parameters)
-    navigator.move(robot.base.odometry, 0.0)
-    navigator.task = drive
-    while not drive.state.ended and robot.time < 60.0:
-        told = robot.measure()
-        assert told is not None
-        scan = Scan(robot.lidar.angles, np.asarray(told.ranges, float), 8.0)
-        velocity = navigator.see(scan, robot.time) or Velocity()
-        robot.base.command(velocity.speed, velocity.turn)
-        robot.advance(0.1)
-        navigator.move(robot.base.odometry, robot.time)
-    assert drive.state is State.ARRIVED, drive.reason
-    assert world.place_at(*robot.base.pose[:2]) == 'R1'
-    assert robot.base.collisions == 0

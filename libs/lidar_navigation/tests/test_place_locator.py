@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
-from lidar_navigation.localisation.place_locator import PlaceLocator, PlaceRegions, _stretched
+from lidar_navigation import PlaceLocator
+from lidar_navigation.localisation.place_locator import PlaceRegions, _stretched
 
 SIDE = 0.05
 DOORS = {'D1': (2.0, 0.5, 2.0, 1.5), 'D2': (4.0, 1.5, 4.0, 0.5)}

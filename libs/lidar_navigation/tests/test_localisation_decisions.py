@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
+from lidar_navigation import Localiser
 from lidar_navigation.geometry import Points, Pose, Scan
-from lidar_navigation.localisation.localisation import Localiser, _apart, _overlap, _Rival
+from lidar_navigation.localisation.localisation import _apart, _overlap, _Rival
 
 HERE = (5.0, 5.0, 0.0)
 CLOSE = (5.6, 5.0, 0.0)

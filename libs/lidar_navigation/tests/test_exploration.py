@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
-from lidar_navigation.driving.driving import Drive, Spin, State
-from lidar_navigation.driving.path_following import Velocity
-from lidar_navigation.exploration.exploration import Exploration, Phase
+from lidar_navigation import Drive, DriveState, Exploration, Phase, Spin, Velocity
 from lidar_navigation.geometry import Pose, Scan, composed
 
 AROUND = np.linspace(-math.pi, math.pi, 180)
@@ -134,7 +132,7 @@ def test_a_map_that_is_whole_brings_it_home_and_a_stop_ends_it() -> None:
     assert exploration.goal is None
     drive = exploration._task
     assert isinstance(drive, Drive)
-    drive.state = State.ARRIVED
+    drive.state = DriveState.ARRIVED
     assert sees(exploration, 0.1) == Velocity()
     exploration.think()
     assert (exploration.phase, exploration.reason) == (Phase.DONE, '')
@@ -152,7 +150,7 @@ def test_a_way_back_that_fails_does_not_matter_at_home(x: float, reason: str) ->
     builder.due = False
     drive = exploration._task
     assert isinstance(drive, Drive)
-    drive.state, drive.reason = State.FAILED, 'it is stuck'
+    drive.state, drive.reason = DriveState.FAILED, 'it is stuck'
     sees(exploration, 0.1, (x, 2.0, 0.0))
     exploration.think()
     assert (exploration.phase, exploration.reason) == (Phase.DONE, reason)
@@ -169,7 +167,7 @@ def test_a_frontier_that_a_drive_does_not_reach_is_left_with_the_reason() -> Non
         assert isinstance(drive, Drive)
         if exploration.phase is not Phase.EXPLORING:
             break
-        drive.state, drive.reason = State.FAILED, 'a box is in the way'
+        drive.state, drive.reason = DriveState.FAILED, 'a box is in the way'
         sees(exploration, 1.0)
         exploration.think()
     assert exploration.phase is Phase.RETURNING
@@ -189,7 +187,7 @@ def test_what_was_seen_goes_into_the_map_before_it_goes_on() -> None:
     assert goal is not None
     assert isinstance(drive, Drive)
     builder.due = False
-    drive.state = State.ARRIVED
+    drive.state = DriveState.ARRIVED
     sees(exploration, 1.0)
     assert not exploration.think()
     assert exploration.goal is goal
@@ -214,7 +212,7 @@ def test_a_frontier_of_which_most_was_seen_is_done(left: int, given_up: bool) ->
     # Of its 78 cells so many still lie beside the unknown.
     cells[1 : 1 + left, 80:] = -1
     builder.drawn = Grid(cells, 0.05)
-    drive.state = State.ARRIVED
+    drive.state = DriveState.ARRIVED
     sees(exploration, 1.0)
     exploration.think()
     sees(exploration, 1.1)
@@ -229,16 +227,16 @@ def test_a_drive_that_asks_gets_another_way_or_the_reason_why_there_is_none() ->
     assert isinstance(drive, Drive)
     builder.due = False
     sees(exploration, 0.1)
-    drive.state = State.ASKING
+    drive.state = DriveState.ASKING
     exploration.think()
-    assert drive.state is State.DRIVING
+    assert drive.state is DriveState.DRIVING
     assert exploration._task is drive
     # Boxes right across the hall, 2 m ahead.
     angles = np.linspace(-0.79, 0.79, 180)
     exploration.see(Scan(angles, 2.0 / np.cos(angles), 8.0), HOME, 0.2)
-    drive.state = State.ASKING
+    drive.state = DriveState.ASKING
     exploration.think()
-    assert drive.state is State.WAITING
+    assert drive.state is DriveState.WAITING
     assert exploration._task is drive
     assert exploration.reason == drive.reason
     assert 'an obstacle at (3.' in exploration.reason

@@ -15,14 +15,8 @@ from skimage.graph import MCP_Geometric
 from floor_plans import Grid
 from floor_plans.occupancy_grid import distance_to, drawn_lines, with_walls
 from floor_plans.parameters import zones_from
-from lidar_navigation import geometry
-from lidar_navigation.planning.grid_planning import (
-    GridPlanner,
-    NoPathError,
-    PlanningParameters,
-    _corners,
-    _poses_along,
-)
+from lidar_navigation import GridPlanner, NoPathError, PlanningParameters, geometry
+from lidar_navigation.planning.grid_planning import _corners, _poses_along
 
 RESOLUTION = 0.05
 ROBOT = PlanningParameters(radius=0.2)

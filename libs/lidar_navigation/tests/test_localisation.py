@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from floor_plans import Grid
+from lidar_navigation import Localiser
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed, in_map, relative
-from lidar_navigation.localisation.localisation import Localiser
 
 POSES = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lidar_navigation import Localiser
 from lidar_navigation.geometry import Pose, Scan, composed, relative
-from lidar_navigation.localisation.localisation import Localiser
 from lidar_navigation.localisation.odometry import (
     ContinuousOdometry,
     OdometryBuffer,

@@ -1,6 +1,6 @@
 """Plan paths on a grid map: two rooms, a door that closes, an obstacle that appears. No ROS.
 
-python examples/plan_on_a_grid.py
+python libs/lidar_navigation/examples/plan_on_a_grid.py
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 
 from floor_plans import Grid
 from floor_plans.occupancy_grid import OCCUPIED
+from lidar_navigation import GridPlanner, NoPathError
 from lidar_navigation.geometry import Points, length
-from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError
 
 PLAN = """
 ############################################################

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation import DriveParameters, Velocity
 from lidar_navigation.driving.sampled_planning import (
     SampledPlanner,
     _standing,

@@ -10,17 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lidar_navigation import geometry
+from lidar_navigation import DriveParameters, Footprint, Velocity, geometry
 from lidar_navigation.driving.path_following import (
-    DriveParameters,
     PathFollower,
-    Velocity,
     as_forwards,
     room_ahead,
     safe_turn,
     speed_to_stop,
 )
-from lidar_navigation.footprint import Footprint
 from lidar_navigation.geometry import composed
 
 NOTHING = np.zeros((0, 2))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
-from lidar_navigation.exploration.map_building import MapBuilder, MappingParameters
+from lidar_navigation import MapBuilder, MappingParameters
 from lidar_navigation.geometry import Pose, Scan
 
 ANGLES = (np.arange(180) + 0.5) * math.tau / 180 - math.pi
@@ -81,7 +81,7 @@ def test_a_loop_in_doubt_changes_nothing(error: float, options: dict[str, Any]) 
     builder = driven(error, options)
     assert builder.loops == 0
     assert builder.graph.poses[-1] == pytest.approx((START[0] + error, START[1], 0.0))
-    assert len(builder.graph.edges) == 8
+    assert len(builder.graph.constraints) == 8
 
 
 def test_what_was_drawn_before_the_loop_is_drawn_anew() -> None:
@@ -143,7 +143,7 @@ def test_an_odometry_step_is_the_less_sure_the_longer_it_is() -> None:
     builder = MapBuilder(parameters=parameters)
     builder.see(room(HOME), (0.0, 0.0, 0.0))
     builder.see(room(HOME), (0.3, 0.4, -0.2))
-    (edge,) = builder.graph.edges
+    (edge,) = builder.graph.constraints
     assert (edge.first, edge.second, edge.may_be_wrong) == (0, 1, False)
     assert edge.step == pytest.approx((0.3, 0.4, -0.2))
     across = 1 / (0.01 * 0.5 + 1e-4)
@@ -156,7 +156,7 @@ def test_a_scan_that_fits_corrects_the_odometry_and_is_surer() -> None:
     builder.see(room(HOME), HOME)
     builder.see(room((2.4, 1.5, 0.0)), (2.5, 1.55, 0.05))
     assert builder.graph.poses[1] == pytest.approx((2.4, 1.5, 0.0), abs=0.01)
-    assert builder.graph.edges[0].information[0, 0] > 1 / (0.01 * 0.5 + 1e-4)
+    assert builder.graph.constraints[0].information[0, 0] > 1 / (0.01 * 0.5 + 1e-4)
 
 
 def test_beyond_the_reach_a_ray_shows_neither_walls_nor_floor() -> None:
