@@ -25,7 +25,7 @@ from floor_plans.imports import ImportRequest, import_place
 from floor_plans.occupancy_map import write_map
 from surveillance_operator.place_page.edit_command import editor_page
 from tests.operator.browser import DESK, Viewer
-from tests.operator.test_place_page import drop_of
+from tests.operator.test_dropped_map import drop_of
 
 SIDE = 0.05
 TURN = 8.0

@@ -50,7 +50,7 @@ def main() -> None:
     moving = Status(100.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, '', ())
     way = [(x, 1.5) for x in np.linspace(1.5, 4.5, 13)]
     steps = [
-        {'decision': decision, 'number': 1, 'status': moving, 'urgent': frozenset({'B'})},
+        {'decision': decision, 'decision_number': 1, 'status': moving, 'urgent': frozenset({'B'})},
         *({'pose': (*point, 0.0), 'trail': np.array(way[: n + 1])} for n, point in enumerate(way)),
         {
             'status': replace(moving, place='B', text='arrived in B'),
@@ -60,7 +60,7 @@ def main() -> None:
     ]
     start = time.time()
     for second, fields in enumerate(steps):
-        new = replace(state, now=100.0 + second, **fields)  # type: ignore[arg-type]
+        new = state.having(now=100.0 + second, **fields)
         state, told = follow(state, new, at=start + second)
         for change in told:
             print(f'{second:3d} s      {change.text} {change.detail}'.rstrip())

@@ -17,7 +17,7 @@ from launcher.environment import (
     CHECKOUT,
     INSTALLED,
     PROGRAM,
-    Environment,
+    PythonEnvironment,
     clean_environ,
     compile_interfaces,
     keep_bytecode,
@@ -81,7 +81,7 @@ def main(argv: Sequence[str]) -> int:
         return os.EX_TEMPFAIL
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one is enough
-        ready = INSTALLED or Environment(CHECKOUT).ready()
+        ready = INSTALLED or PythonEnvironment(CHECKOUT).ready()
         more = '' if ready else '; the next start continues the set-up'
         print(f'\n{PROGRAM}: interrupted{more}', file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -332,7 +332,7 @@ def _package_command(name: str, argv: list[str]) -> int:
     return carry_out(argv)
 
 
-def _environment(extras: Sequence[str], wheels: Path | None = None) -> Environment | None:
+def _environment(extras: Sequence[str], wheels: Path | None = None) -> PythonEnvironment | None:
     """Return the environment to run in; None where an installed ROS with this workspace is
     active.
     """
@@ -343,7 +343,7 @@ def _environment(extras: Sequence[str], wheels: Path | None = None) -> Environme
             'ROS 2 Jazzy is active in this shell, but this workspace is not built. Build it:\n'
             f'{system.colcon_advice(CHECKOUT)}\nor use a shell without ROS.'
         )
-    return Environment(CHECKOUT, extras, wheels)
+    return PythonEnvironment(CHECKOUT, extras, wheels)
 
 
 def _enter(argv: list[str], extras: Sequence[str] = ()) -> None:

@@ -175,7 +175,7 @@ def _hash(pieces: Iterable[bytes]) -> str:
     return digest.hexdigest()
 
 
-class Environment:
+class PythonEnvironment:
     """The Python environment that the nodes of one checkout run in.
 
     Args:
@@ -586,7 +586,7 @@ class _Command:
     It inherits the lock, so that the pip of a killed launcher still keeps others out.
     """
 
-    def __init__(self, environment: Environment, words: list[str], lock: int) -> None:
+    def __init__(self, environment: PythonEnvironment, words: list[str], lock: int) -> None:
         self._log = environment.venv / 'setup.log'
         # pip would compile all of every package, which takes as long as to unpack it.
         environ = {**clean_environ(), 'PIP_COMPILE': '0'}

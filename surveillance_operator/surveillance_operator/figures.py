@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from surveillance_operator.mission_state import MissionState
 
 
-class Heard(NamedTuple):
+class FigureTopic(NamedTuple):
     """A topic that nothing but one figure is read from.
 
     Attributes:
@@ -52,7 +52,7 @@ class Figure(NamedTuple):
     share: Callable[[MissionState], float | None] = lambda _state: None
     awaited: tuple[str, str] | None = None
     is_brief: bool = False
-    heard: Heard | None = None
+    heard: FigureTopic | None = None
 
 
 class ShownFigure(NamedTuple):
@@ -116,7 +116,7 @@ FIGURES: tuple[Figure, ...] = (
         'voltage',
         'voltage',
         lambda state: f'{state.measured["voltage"]:.1f} V' if 'voltage' in state.measured else '',
-        heard=Heard('battery_state', 'sensor_msgs/msg/BatteryState', _volts),
+        heard=FigureTopic('battery_state', 'sensor_msgs/msg/BatteryState', _volts),
     ),
     Figure(
         'doors',

@@ -109,7 +109,7 @@ class MissionPage(PatrolNode):
         self._sightings = Sightings(self, evidence_folder)
         self._broadcaster = Broadcaster()
         files = self.declare_fields(EditablePlace())
-        self._cameras: dict[str, CameraView] = {'': CameraView(self)}
+        self._cameras: dict[str, CameraPictures] = {'': CameraPictures(self)}
         self._subscriber = FleetSubscriber(
             self, self._period, self._on_news, self._broadcaster.forget, streams=True
         )
@@ -167,7 +167,7 @@ class MissionPage(PatrolNode):
         if robot not in self._cameras:
             self._actions.of(robot)
             self._sightings.follow(robot)
-            self._cameras[robot] = CameraView(self, robot)
+            self._cameras[robot] = CameraPictures(self, robot)
 
     def _session(self, files: EditablePlace) -> EditSession | None:
         """Let the place be edited; None, with a warning, where its file cannot be."""
@@ -288,7 +288,7 @@ def _kept_token(path: str) -> str:
     return read_file(path, 4096).decode('ascii', 'replace').strip()
 
 
-class CameraView:
+class CameraPictures:
     """Gives the newest image of a node's camera, which is heard only while somebody looks.
 
     Args:

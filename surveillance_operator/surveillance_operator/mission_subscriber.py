@@ -18,7 +18,7 @@ from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_questions import MissionQuestions
 from surveillance_operator.mission_state import RECORD_OF, MissionState, Notice
 from surveillance_operator.node_graph_watch import NodeGraphWatch, current_reports
-from surveillance_operator.other_robots import OtherRobots
+from surveillance_operator.other_poses import OtherPoses
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.topic_reader import WAKE_PERIOD, TopicReader
 from surveillance_operator.topics import read_message
@@ -36,7 +36,7 @@ KEPT = ('notices', 'visited_at', 'urgent', 'links', 'restarts')
 """What is still known when another mission begins: who follows the ontology is told what goes."""
 
 
-class MissionClock:
+class WatchedClock:
     """The mission's time: the topic `/clock` where there is one, else the node's clock.
 
     Args:
@@ -44,7 +44,7 @@ class MissionClock:
         shared: The clock of whoever reads the topic already.
     """
 
-    def __init__(self, node: PatrolNode, shared: MissionClock | None = None) -> None:
+    def __init__(self, node: PatrolNode, shared: WatchedClock | None = None) -> None:
         self._node = node
         self._shared = shared
         self._topic = (
@@ -116,11 +116,11 @@ class MissionSubscriber:
         self._over = False
         self._left = threading.Event()
         clock, graph = (None, None) if place is None else (place._clock, place._graph)
-        self._clock: MissionClock = MissionClock(node, clock)
+        self._clock: WatchedClock = WatchedClock(node, clock)
         self._reader = TopicReader(node, robot, streams=streams)
         self._graph: NodeGraphWatch = NodeGraphWatch(node, prefix, graph)
         self._questions = MissionQuestions(node, self.update, robot)
-        self._others = OtherRobots(node) if streams and not robot else None
+        self._others = OtherPoses(node) if streams and not robot else None
         self._robots: Mapping[str, MissionSubscriber] = {}
         node.spawn(self._run, 'mission subscriber')
 

@@ -18,7 +18,7 @@ from launcher import cli
 from launcher.environment import (
     INTERFACES,
     JOURNAL,
-    Environment,
+    PythonEnvironment,
     _Command,
     clean_environ,
     keep_bytecode,
@@ -65,10 +65,10 @@ test = []
 PREPARE = """
 import sys
 from pathlib import Path
-from launcher.environment import Environment
+from launcher.environment import PythonEnvironment
 wheels, collected = (Path(word) if word else None for word in (*sys.argv[2:], '', '')[:2])
 try:
-    environment = Environment(Path(sys.argv[1]), wheels=wheels)
+    environment = PythonEnvironment(Path(sys.argv[1]), wheels=wheels)
     environment.prepare() if collected is None else environment.collect(collected)
 except ValueError as error:
     sys.exit(str(error))
@@ -314,7 +314,7 @@ def test_what_a_set_up_runs_leaves_no_compiled_modules_and_finds_those_of_pip(
         )
         words = [sys.executable, '-c', code]
         with (
-            _Command(Environment(tmp_path), words, lock) as command,
+            _Command(PythonEnvironment(tmp_path), words, lock) as command,
             SetUpStep(1, 1, 'import') as step,
         ):
             command.watch(step)

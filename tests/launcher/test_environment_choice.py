@@ -15,7 +15,7 @@ from launcher.environment import (
     FOLDERS,
     INTERFACES,
     SPACE,
-    Environment,
+    PythonEnvironment,
     SetUpJournal,
     _Command,
     clean_environ,
@@ -58,18 +58,18 @@ def test_libraries_of_the_checkout_are_not_installed_but_what_they_need_is(check
 
 
 def test_the_complete_environment_is_taken_with_the_extras_it_has(checkout: Path) -> None:
-    assert Environment(checkout).venv == checkout / '.venv'
-    assert not Environment(checkout).ready()
+    assert PythonEnvironment(checkout).venv == checkout / '.venv'
+    assert not PythonEnvironment(checkout).ready()
     venv(checkout, '.venv', python='3.9 /opt')
     second = venv(checkout, '.venv-3.11-1', 'test')
     (checkout / '.venv.link').symlink_to(second)
-    chosen = Environment(checkout)
+    chosen = PythonEnvironment(checkout)
     assert (chosen.venv, chosen.ready()) == (second, True)
     assert chosen.python == second / 'bin' / 'python'
     assert not chosen.active()
-    assert not Environment(checkout, extras=['mujoco']).ready(), 'that extra is not there'
+    assert not PythonEnvironment(checkout, extras=['mujoco']).ready(), 'that extra is not there'
     (second / 'bin' / 'python').unlink()
-    assert not Environment(checkout).ready()
+    assert not PythonEnvironment(checkout).ready()
 
 
 def test_one_in_use_and_one_of_another_interpreter_are_left_alone(
@@ -80,7 +80,7 @@ def test_one_in_use_and_one_of_another_interpreter_are_left_alone(
     version = f'{sys.version_info.major}.{sys.version_info.minor}'
 
     def chosen() -> str:
-        environment = Environment(checkout)
+        environment = PythonEnvironment(checkout)
         environment._choose()
         return environment.venv.name
 
@@ -110,7 +110,7 @@ def test_the_link_leads_to_the_one_set_up_last_and_old_ones_go(
     used.append(busy)
     (checkout / INTERFACES / 'A.msg').write_text('int32 a\n')
     new = venv(checkout, '.venv-d')
-    environment = Environment(checkout)
+    environment = PythonEnvironment(checkout)
     environment._settle()
     assert [each.exists() for each in (old, foreign, busy, new)] == [False, True, True, True]
     assert (checkout / '.venv').readlink() == Path('.venv-d')
@@ -129,7 +129,7 @@ def test_a_new_one_begins_with_what_the_one_in_use_has(
     (first / 'lib' / 'module.py').write_text(f'{first}\n')
     (first / 'bin' / 'program').write_bytes(os.fsencode(f'{first}\0'))
     python = SetUpJournal.read(first).python
-    environment = Environment(checkout)
+    environment = PythonEnvironment(checkout)
     assert environment._seed(python) is None, 'there is one already'
     environment.venv = checkout / '.venv-3.11-1'
     assert environment._seed(python) is None, 'nobody uses the other one'
@@ -152,7 +152,7 @@ def test_who_runs_in_an_environment_is_found(tmp_path: Path) -> None:
 
 
 def test_what_was_half_installed_is_taken_away(checkout: Path) -> None:
-    environment = Environment(checkout)
+    environment = PythonEnvironment(checkout)
     site = environment._site_packages()
     version = f'python{sys.version_info.major}.{sys.version_info.minor}'
     assert site == checkout / '.venv' / 'lib' / version / 'site-packages'
@@ -174,11 +174,11 @@ def test_without_room_on_the_disk_nothing_is_begun(
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[Any] = []
-    monkeypatch.setattr(Environment, '_carry_out', lambda *words: begun.append(words))
-    monkeypatch.setattr(Environment, '_write_path_file', lambda _: None)
+    monkeypatch.setattr(PythonEnvironment, '_carry_out', lambda *words: begun.append(words))
+    monkeypatch.setattr(PythonEnvironment, '_write_path_file', lambda _: None)
     disk = shutil.disk_usage(checkout)
     monkeypatch.setattr(shutil, 'disk_usage', lambda _: disk._replace(free=SPACE - 1))
-    environment = Environment(checkout)
+    environment = PythonEnvironment(checkout)
     with pytest.raises(NotNowError, match=r'\.venv: the set-up needs 900 MB, 899 MB are free on'):
         environment._set_up(0)
     assert begun == []
@@ -192,7 +192,7 @@ def test_without_room_on_the_disk_nothing_is_begun(
 
 
 def test_a_middleware_that_is_not_installed_is_left_out_with_a_line(checkout: Path) -> None:
-    environment = Environment(checkout)
+    environment = PythonEnvironment(checkout)
     (checkout / '.venv' / 'lib').mkdir(parents=True)
     (checkout / '.venv' / 'lib' / 'librmw_cyclonedds_cpp.so').write_text('')
     given = {
@@ -210,12 +210,12 @@ def test_a_middleware_that_is_not_installed_is_left_out_with_a_line(checkout: Pa
 
 def test_a_folder_without_wheels_is_said(tmp_path: Path, checkout: Path) -> None:
     with pytest.raises(ValueError, match=r'--wheels .*none: expected a folder of wheels'):
-        Environment(checkout, wheels=tmp_path / 'none')
+        PythonEnvironment(checkout, wheels=tmp_path / 'none')
     (tmp_path / 'some').mkdir()
     with pytest.raises(ValueError, match=r'no wheel \(\*\.whl\) in it: fill it on a machine with'):
-        Environment(checkout, wheels=tmp_path / 'some')
+        PythonEnvironment(checkout, wheels=tmp_path / 'some')
     (tmp_path / 'some' / 'a.whl').write_text('')
-    assert Environment(checkout, wheels=tmp_path / 'some').wheels == tmp_path / 'some'
+    assert PythonEnvironment(checkout, wheels=tmp_path / 'some').wheels == tmp_path / 'some'
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_a_folder_without_wheels_is_said(tmp_path: Path, checkout: Path) -> None
     ],
 )
 def test_why_a_step_failed_is_told_in_one_line(checkout: Path, printed: str, reason: str) -> None:
-    environment = Environment(checkout)
+    environment = PythonEnvironment(checkout)
     environment.venv.mkdir()
     code = f'import sys; print({printed!r}); sys.exit(3)'
     lock = os.open(checkout, os.O_RDONLY)

@@ -1,16 +1,24 @@
-"""A disk that can be full, for what writes recordings."""
+"""A disk that can be full, a recording of another program, a browser."""
 
 from __future__ import annotations
 
 import errno
 import io
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
 import pytest
+from rclpy.serialization import serialize_message
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from surveillance_operator.recording import bag
+from surveillance_operator import fleet_subscriber, node_graph_watch
+from surveillance_operator.recording import bag as recorded_bag
+from surveillance_operator.recording.schemas import definition
+from tests.operator.browser import Viewer
+from tests.operator.foreign_bag import START, said
 
 
 class Disk:
@@ -45,5 +53,38 @@ class _File(io.FileIO):
 def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
     """Return the disk that recordings are written to."""
     made = Disk()
-    monkeypatch.setattr(bag, 'open', made.open, raising=False)
+    monkeypatch.setattr(recorded_bag, 'open', made.open, raising=False)
     return made
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('foreign') / 'rosbag2_2026'
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections: dict[str, Any] = {}
+        for at, topic, message in said():
+            kind = f'{type(message).__module__.split(".")[0]}/msg/{type(message).__name__}'
+            if topic not in connections:
+                store.register({
+                    name: fields
+                    for name, fields in get_types_from_msg(definition(kind), kind).items()
+                    if name not in store.fielddefs
+                })  # fmt: skip
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], int((START + at) * 1e9), serialize_message(message))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def browser() -> Iterator[Viewer]:
+    viewer = Viewer('about:blank')
+    yield viewer
+    viewer.close()
+
+
+@pytest.fixture(autouse=True)
+def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have nodes and robots that come and go be seen at once."""
+    for module in (node_graph_watch, fleet_subscriber):
+        monkeypatch.setattr(module, 'LOOK_PERIOD', 0.05)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,24 +9,18 @@ import pytest
 from rich.console import Console
 from std_msgs.msg import Float32
 
-from patrol_policy.promises import Promise
 from surveillance_operator import figures
 from surveillance_operator.console_commands import answer
-from surveillance_operator.figures import FIGURES, Figure, Heard, figures_line, figures_of
+from surveillance_operator.figures import FIGURES, Figure, FigureTopic, figures_line, figures_of
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_state import (
-    RECORD_OF,
-    RECORDS,
     MissionState,
 )
-from surveillance_operator.page import server
-from surveillance_operator.page_state import PARTS, PatchMaker, traced
+from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 from surveillance_operator.topics import TOPICS, read_message, topic_of
 from surveillance_operator.watch.view import MissionView
 from tests.operator.prompt import Prompt
-
-from .test_mission_view import whole
 
 HUMIDITY = Figure(
     'humidity',
@@ -35,19 +28,10 @@ HUMIDITY = Figure(
     lambda state: f'{state.measured["humidity"]:.0f} %' if state.measured else '',
     lambda state: state.measured.get('humidity', 0.0) > 80.0,
     is_brief=True,
-    heard=Heard('humidity', 'std_msgs/msg/Float32', lambda message: message.data),
+    heard=FigureTopic('humidity', 'std_msgs/msg/Float32', lambda message: message.data),
 )
-INNER = {
-    'now': 'the time goes with each message',
-    'namespace': 'the robot is chosen by its name',
-    'measured': 'each figure reads its own of it',
-    'pose_time': 'pairs scans with poses',
-    'lidar': 'becomes the scan on the map',
-    'camera': 'becomes the markers on the map',
-    'stands': 'becomes the markers on the map',
-    'localised': 'says whose pose counts',
-    'trail': 'is lengthened by whoever follows the pose',
-}
+
+
 """The fields that no view shows by themselves, with what they are for."""
 
 
@@ -98,48 +82,6 @@ def test_the_voltage_of_a_driver_is_shown_and_none_where_it_is_not_measured() ->
     assert figure.words(state) == '24.2 V'
     state = read_message(state, topic, topic.kind(voltage=float('nan')))
     assert figure.words(state) == ''
-
-
-def test_no_two_records_of_a_state_have_a_field_of_the_same_name() -> None:
-    assert len(RECORD_OF) == sum(len(each.__dataclass_fields__) for each in RECORDS.values())
-
-
-def test_each_field_of_a_state_is_shown_by_some_part_or_said_to_be_inner() -> None:
-    promise = Promise('A', 'within', 240.0, 60.0, 'A within 240 s')
-    state = whole().having(promises=(promise,))
-    read = set(INNER) | set(RECORDS)
-    for compute in PARTS.values():
-        read |= traced(compute, state)[1].keys()
-    assert RECORD_OF.keys() - read == set()
-    assert INNER.keys() <= RECORD_OF.keys()
-
-
-def test_the_page_draws_each_part_and_asks_for_no_other() -> None:
-    text = (server.STATIC / 'main.js').read_text('utf-8')
-    drawn = text[text.index('const MAP_PARTS') : text.index('function receive')]
-    needs = set(re.findall(r"'(\w+)'", ''.join(re.findall(r'\[[^\[\]]*\]', drawn))))
-    assert PARTS.keys() - needs == set(), 'a part that no section of the page draws'
-    of_the_page = {'robots', 'trail'}
-    of_old_recordings = {'battery'}
-    assert needs - PARTS.keys() == of_the_page | of_old_recordings
-
-
-def test_a_part_is_computed_anew_when_a_field_that_it_reads_changes() -> None:
-    computed = []
-
-    def part(state: MissionState) -> Any:
-        computed.append(state)
-        return [state.whereabouts, state.task.battery if state.task.stopped else None]
-
-    maker = PatchMaker()
-    maker._parts = {'part': part}
-    state = MissionState().having(robot_place='A')
-    assert maker.patch(state) == {'part': ['in A', None]}
-    assert maker.patch(state.having(battery=5.0, policy='tour')) == {}
-    assert len(computed) == 1, 'the battery was not read'
-    assert maker.patch(state.having(robot_place='B')) == {'part': ['in B', None]}
-    assert maker.patch(state.having(stopped=True, battery=5.0)) == {'part': ['in A', 5.0]}
-    assert maker.patch(state.having(stopped=True, battery=6.0)) == {'part': ['in A', 6.0]}
 
 
 def test_figures_follow_the_state() -> None:

@@ -11,7 +11,11 @@ from surveillance_interfaces.msg import MissionStatus, RobotPlace
 from surveillance_operator.console_node import status_line
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_changes import follow
-from surveillance_operator.mission_state import MissionState
+from surveillance_operator.mission_state import (
+    RECORD_OF,
+    RECORDS,
+    MissionState,
+)
 from surveillance_operator.mission_words import doing
 from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.topics import TOPICS, read_message
@@ -69,3 +73,10 @@ def test_a_field_that_there_is_not_cannot_be_set() -> None:
     state = MissionState(where='here').having(battery=5.0, now=1.0)
     assert (state.field('battery'), state.field('now'), state.where) == (5.0, 1.0, 'here')
     assert replace(state, now=2.0).task is state.task
+
+
+"""The fields that no view shows by themselves, with what they are for."""
+
+
+def test_no_two_records_of_a_state_have_a_field_of_the_same_name() -> None:
+    assert len(RECORD_OF) == sum(len(each.__dataclass_fields__) for each in RECORDS.values())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,7 @@ import pytest
 
 from patrol_policy.world import Decision
 from strict_files.files import FileError
-from surveillance_operator.mission_state import MissionState, Status
-from surveillance_operator.page_state import PatchMaker
+from surveillance_operator.mission_state import MissionState
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 
 DECISION = Decision(0.0, 'A', 'B', 'B', 'URGENT', 'tour', 'why', {'B': 1.0})
@@ -114,25 +112,3 @@ def test_what_is_no_time_line_is_said_in_one_line(content: str | None, tmp_path:
         path.write_text(content)
     with pytest.raises(FileError, match=r'timeline\.jsonl: '):
         Timeline(path)
-
-
-def test_a_patch_holds_what_changed_alone() -> None:
-    framer = PatchMaker()
-    first = framer.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
-    assert first['brief'] == 'battery 50 %'
-    assert (
-        framer.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
-        == {}
-    )
-    after = framer.patch(MissionState().having(battery=49.0, decision=DECISION, decision_number=1))
-    assert after.keys() == {'brief', 'figures'}
-    assert after['brief'] == 'battery 49 %'
-
-
-def test_a_robot_that_waits_for_help_has_no_plan() -> None:
-    framer = PatchMaker()
-    moving = Status(0.0, 'm', 'MOVE', 'A', 'B', False, '', ())
-    state = MissionState().having(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
-    assert framer.patch(state)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
-    stuck = state.having(status=replace(moving, waiting_for_help=True))
-    assert framer.patch(stuck)['plan'] == []

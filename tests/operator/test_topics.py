@@ -11,30 +11,16 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 from armor_service.facts import parse_fact
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray
-from surveillance_operator import node_graph_watch
 from surveillance_operator.mission_state import MissionState
-from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.topics import DETECTIONS_TOPIC, TOPICS, read_message, with_fact
-from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.place_changes import description_text, follow_place
-from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
+from tests.operator.peers import pose
 
 TOPIC = {topic.name: topic for topic in TOPICS}
-
-
-def pose(x: float, y: float, yaw: float = 0.0, second: int = 5) -> PoseWithCovarianceStamped:
-    message = PoseWithCovarianceStamped()
-    message.header.stamp = Time(sec=second)
-    at = message.pose.pose
-    at.position.x, at.position.y = x, y
-    at.orientation.z, at.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
-    return message
 
 
 def joints(speed: float = 0.0) -> JointState:
@@ -107,69 +93,6 @@ def test_facts_come_and_go() -> None:
     state = with_fact(state, parse_fact('visitedAt(R1, "7"^^xsd:long)'), came=False)
     assert state.place.visited_at == {'R1': 9.0}
     assert with_fact(state, parse_fact('URGENT(R1)'), came=False).place.urgent == set()
-
-
-class Watcher(PatrolNode):
-    """Watches as the page does."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__('mission_watcher', **options)
-        self.subscriber = MissionSubscriber(self, 0.05, streams=True)
-
-
-def test_robots_of_other_namespaces_appear_and_go(
-    graph: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(node_graph_watch, 'LOOK_PERIOD', 0.05)
-    watcher = graph.add(Watcher)
-    publishers = {
-        name: graph.node.create_publisher(PoseWithCovarianceStamped, topic, STATE_QOS)
-        for name, topic in (('', 'amcl_pose'), ('two', '/two/amcl_pose'), ('a/b', '/a/b/amcl_pose'))
-    }
-    for number, publisher in enumerate(publishers.values()):
-        publisher.publish(pose(float(number), 0.0))
-    graph.until(lambda: watcher.subscriber.state.place.others.keys() == {'two', 'a/b'})
-    assert watcher.subscriber.state.place.others['two'] == (1.0, 0.0, 0.0)
-    graph.until(lambda: watcher.subscriber.state.sensors.pose == (0.0, 0.0, 0.0))
-    graph.node.destroy_publisher(publishers['two'])
-    graph.until(lambda: watcher.subscriber.state.place.others.keys() == {'a/b'})
-
-
-def test_who_leaves_a_mission_hears_nothing_more(
-    graph: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A fleet's page leaves robots that go: their topics would come in for ever."""
-    monkeypatch.setattr(node_graph_watch, 'LOOK_PERIOD', 0.05)
-    watcher = graph.add(Watcher)
-    publisher = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
-    publisher.publish(pose(1.0, 0.0))
-    graph.until(lambda: watcher.subscriber.state.sensors.pose == (1.0, 0.0, 0.0))
-    watcher.subscriber.leave()
-    graph.until(lambda: publisher.get_subscription_count() == 0)
-    assert graph.node.count_subscribers('battery_level') == 0
-    publisher.publish(pose(2.0, 0.0))
-    assert watcher.subscriber.state.sensors.pose == (1.0, 0.0, 0.0)
-
-
-def test_a_place_that_is_changed_brings_no_robot_back_that_was_left(graph: Any) -> None:
-    """The page showed the robots of an earlier fleet again after an edit of the place."""
-    heard: list[MissionState] = []
-    feed = MissionSubscriber(graph.node, 0.05, lambda new, _told: heard.append(new), robot='anna')
-    sender = graph.node.create_publisher(String, 'place', STATE_QOS)
-
-    def changed(x: float) -> None:
-        sender.publish(String(data=description_text({'doors': {'D1': [x, 0.0, x, 1.0]}})))
-
-    changed(1.0)
-    graph.until(lambda: 'D1' in feed.state.place.door_lines)
-    read: list[object] = []
-    follow_place(graph.node, read.append)  # made later, and so told later
-    feed.leave()
-    before, told = feed.state.place.door_lines, len(heard)
-    changed(2.0)
-    graph.until(lambda: any('2.0' in str(each) for each in read))
-    assert feed.state.place.door_lines == before
-    assert len(heard) == told
 
 
 def test_the_progress_of_a_scan_ends_with_its_goal() -> None:

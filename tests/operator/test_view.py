@@ -1,8 +1,8 @@
-"""Whole screens of the terminal view, as whoever watches a mission has them before them."""
+"""What whoever watches a mission in a terminal gets to see, by itself and as whole screens."""
 
 from __future__ import annotations
 
-import math
+import io
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -11,19 +11,235 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from floor_plans import Grid
-from surveillance_operator.mission_state import MissionState, Notice
-from surveillance_operator.watch import raster
-from surveillance_operator.watch.raster import CharacterCanvas, Viewport
+from state_machines import Interrupt
+from surveillance_operator.mission_state import (
+    MissionState,
+    NodeReport,
+    Notice,
+)
+from surveillance_operator.watch import view
 from surveillance_operator.watch.view import (
     MissionView,
     draw_map,
     figure_lines,
+    node_page,
     place_lines,
     robot_colour,
+    show_once,
 )
+from tests.operator.missions import DECISION, FLEET, STATUS, whole
 
-from .test_mission_view import DECISION, STATUS, whole
+
+def picture(**fields: Any) -> str:
+    file = io.StringIO()
+    console = Console(file=file, width=100, height=34)
+    console.print(MissionView(FLEET['anna'], whole=False, fleet=FLEET, robot='anna', **fields))
+    return file.getvalue()
+
+
+def test_the_terminal_shows_the_robots_and_the_one_that_was_chosen() -> None:
+    shown = picture()
+    assert shown.splitlines()[0].startswith(' anna · surveillance')
+    for line in ('1 anna A on its way to B', '2 bert A on its way to B', 'B is for anna'):
+        assert line in shown
+    on_map = [line[:50] for line in shown.splitlines()]
+    assert all(any(name in line for line in on_map) for name in ('bert', 'carl'))
+    assert shown.count('door D closed') == 1
+    assert 'anna begins' in picture(page='events')
+    assert 'bert begins' in picture(page='events')
+    assert 'shares A, B, next B' in picture(page='robots')
+    for width in range(40, 120, 7):
+        file = io.StringIO()
+        view = MissionView(FLEET['bert'], fleet=FLEET, robot='bert')
+        Console(file=file, width=width, height=20).print(view)
+        assert max(map(len, file.getvalue().splitlines())) <= width
+
+
+def test_a_picture_is_of_the_robot_that_was_named_or_there_is_none() -> None:
+    file, goes_on = io.StringIO(), Interrupt()
+    console = Console(file=file, width=100, height=34)
+    assert not show_once(lambda: FLEET, goes_on, console, 0.0, 'brt')
+    assert file.getvalue() == ''
+    goes_on.set()
+    assert show_once(lambda: FLEET, goes_on, console, 0.0, 'bert')
+    assert file.getvalue().startswith(' bert · surveillance')
+
+
+def shown(state: MissionState, width: int = 100, height: int = 30, colours: bool = False) -> str:
+    console = Console(
+        width=width,
+        height=height,
+        color_system='truecolor' if colours else None,
+        force_terminal=colours,
+    )
+    with console.capture() as capture:
+        console.print(MissionView(state), end='')
+    return capture.get()
+
+
+@pytest.mark.parametrize('page', ['map', 'decision'])
+def test_a_robot_that_waits_for_help_says_for_what_in_the_place_of_its_decision(page: str) -> None:
+    status = replace(STATUS, waiting_for_help=True, text='D is shut; open it')
+    console = Console(width=100, height=30, color_system=None)
+    with console.capture() as capture:
+        console.print(MissionView(whole().having(status=status), page=page), end='')
+    text = capture.get()
+    assert 'the robot waits for help' in text
+    assert text.count('D is shut; open it') == 1
+    assert 'B waits longest' not in text
+
+
+@pytest.mark.parametrize(('width', 'height'), [(100, 30), (80, 24), (40, 30), (40, 12), (7, 3)])
+def test_the_picture_fills_any_terminal_exactly(width, height):
+    for state in (whole(), MissionState(), whole().having(grid=None)):
+        lines = shown(state, width, height).split('\n')
+        assert [len(line) for line in lines] == [width] * height
+
+
+def test_all_that_is_known_can_be_read():
+    text = shown(whole())
+    for words in (
+        'surveillance in mode SIMULATED · ROS domain 7',
+        'MOVE_TO_NEXT_ROOM for 0:05',
+        'in A, heading for B',
+        '80 %',
+        'decision 3: A → B [URGENT]',
+        'B waits longest',
+        'D closed',
+        'A 0:02  ●',
+        'B 1:30 URGENT ←',
+        '12:00:00 arrived in A',
+    ):
+        assert words in text
+    assert text.index('B 1:30') < text.index('A 0:02')
+
+
+def test_the_map_shows_robot_door_obstacle_trail_and_names_without_colours_too():
+    picture = [line[:59] for line in shown(whole()).split('\n')]
+    drawn = '\n'.join(picture)
+    assert all(character in drawn for character in ('↑', 'X', '*', '·', 'A', 'B'))
+    row = next(line for line in picture if '↑' in line)
+    assert row.index('·') < row.index('↑') < row.index('X')
+
+
+def test_a_name_never_covers_another():
+    close = {f'ROOM{number}': (1.0 + 0.1 * number, 3.0) for number in range(9)}
+    picture = shown(whole().having(grid=None, positions=close, visited_at={}), 60, 20)
+    written = [name for name in close if name in picture.split('sketched')[0]]
+    assert 0 < len(written) < 9
+    assert picture.split('sketched')[0].count('ROOM') == len(written)
+
+
+def test_colours_tell_an_open_door_from_a_closed_one():
+    opened = whole().having(doors={'D': True})
+    assert shown(opened, colours=True) != shown(whole(), colours=True)
+    assert 'all 1 open' in shown(opened)
+
+
+def test_what_does_not_come_is_said_in_its_place():
+    text = shown(MissionState(where='ROS domain 7'))
+    assert 'no mission yet: waiting on ROS domain 7' in text
+    for topic in ('map', 'mission_status', 'decision', 'battery_level', 'door_states'):
+        assert f'nothing on {topic} yet' in text
+    assert 'nothing from the ontology yet' in text
+    why = MissionState().having(silent={'map': 'its publisher offers another durability'})
+    assert 'nothing on map yet: its publisher offers another durability' in shown(why)
+
+
+def test_without_a_map_the_places_are_sketched():
+    text = shown(whole().having(grid=None, pose=None, links=frozenset({('A', 'B')})))
+    assert 'sketched: nothing on map yet' in text
+    row = next(line for line in text.split('\n') if '○' in line)
+    assert row.index('●') < row.index('.') < row.index('○')
+
+
+def test_the_end_of_a_node_and_of_the_mission_is_announced():
+    crippled = whole().having(ended=frozenset({'battery_controller'}))
+    assert 'ended: battery_controller' in shown(crippled)
+    assert 'the mission has ended: waiting' in shown(whole().having(nodes={}))
+
+
+def test_what_does_not_fit_is_said_to_be_left_out():
+    many = {f'R{number}': float(number) for number in range(60)}
+    assert '… and more places' in shown(whole().having(visited_at=many))
+    wordy = replace(DECISION, reason='a reason ' * 200)
+    assert '…' in shown(whole().having(decision=wordy))
+
+
+def test_a_whole_reason_is_read_at_80_columns():
+    reason = ' '.join(f'clause {number} of the reason' for number in range(20))
+    text = shown(whole().having(decision=replace(DECISION, reason=reason)), 80, 50)
+    assert '…' not in text
+    assert 'clause 19' in text
+
+
+@pytest.mark.parametrize(
+    ('page', 'words'),
+    [('decision', 'B  '), ('nodes', '● up    robot_behavior'), ('events', '12:00:00 arrived in A')],
+)
+def test_a_key_shows_a_page(page, words):
+    console = Console(width=80, height=24, color_system=None)
+    state = whole().having(decision=replace(DECISION, scores={'B': 1.5, 'C': 0.5}))
+    with console.capture() as capture:
+        console.print(MissionView(state, page=page), end='')
+    assert words in capture.get()
+
+
+def test_each_node_has_one_line_with_the_worst_that_it_reports() -> None:
+    good, late = NodeReport(0, 'up', ()), NodeReport(1, 'late', ())
+    state = MissionState().having(
+        nodes={'robot_behavior': frozenset()},
+        ended=frozenset({'simulator'}),
+        restarts={'robot_behavior': 1},
+        reports={'robot_behavior': good, 'robot_behavior: clock': late, 'mission_recorder': good},
+    )
+    assert [line.plain for line in node_page(state)] == [
+        '▲ WARN  robot_behavior: late, started again 1 time',
+        '✗ ended simulator',
+        '● up    mission_recorder: up',
+    ]
+
+
+def test_a_single_picture_in_a_pipe_is_as_wide_as_columns_says(monkeypatch):
+    for columns, width in (('', 100), ('60', 60)):
+        monkeypatch.setenv('COLUMNS', columns)
+        file = io.StringIO()
+        assert show_once(lambda: {'': whole()}, Interrupt(), Console(file=file), timeout=5.0)
+        assert max(map(len, file.getvalue().splitlines())) == width
+
+
+def test_a_single_picture_waits_until_all_has_come_and_no_longer_than_it_may(monkeypatch):
+    """`watch --once` printed half a picture while map and battery were on their way."""
+    now = [0.0]
+    monkeypatch.setattr(view.time, 'monotonic', lambda: now[0])
+
+    class Passing(Interrupt):
+        def wait(self, timeout: float | None = None) -> bool:
+            assert timeout
+            now[0] += timeout
+            return self.is_set()
+
+    def shown(come_at: float, *, timeout: float = 1.0) -> str:
+        now[0] = 0.0
+        late = whole().having(battery=None)
+        file = io.StringIO()
+        console = Console(file=file)
+        told = show_once(
+            lambda: {'': whole() if now[0] >= come_at else late}, Passing(), console, timeout
+        )
+        assert told
+        return file.getvalue()
+
+    assert '80 %' in shown(0.0)
+    assert now[0] == 0.0, 'what is complete is drawn at once'
+    assert '80 %' in shown(1.5)
+    assert '80 %' not in shown(9.0)
+    assert 2.0 <= now[0] < 2.2
+    now[0] = 0.0
+    nothing = Console(file=io.StringIO())
+    assert not show_once(lambda: {'': MissionState()}, Passing(), nothing, timeout=3.0)
+    assert 3.0 <= now[0] < 3.2
+
 
 OTHER = replace(STATUS, place='B', state='CHARGE', heading_to='', text='')
 
@@ -57,6 +273,8 @@ BESIDE = """
 █▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄█▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄▄█ ── events ──────────────────────────────
                                                             hh:mm:ss arrived in A
 """
+
+
 SKETCHED = """
  surveillance in mode SIMULATED · ROS domain 7
 
@@ -79,7 +297,9 @@ doors D closed, 0 open
 hh:mm:ss arrived in A
 
 """
-FLEET = """
+
+
+OF_A_FLEET = """
  r1 · surveillance in mode SIMULATED · ROS domain 7
 █▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀█▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀▀█ ── robots ──────────────────────────────
 █                                    █                █ 1 r1 A on its way to B
@@ -106,6 +326,8 @@ FLEET = """
 
  the last line
 """
+
+
 SCORES = """
  surveillance in mode SIMULATED · ROS domain 7
 decision 3: A → B [URGENT]
@@ -116,11 +338,15 @@ policy tour, target B
 
 
 """
+
+
 ROBOTS = """
  r2 · surveillance in mode SIMULATED · ROS domain 7
 r1      A         battery 80 %        on its way to B
 r2      B         battery 15 % (low)  charge
 """
+
+
 EVENTS = """
  surveillance in mode SIMULATED · ROS domain 7
 hh:mm:ss arrived in A
@@ -138,7 +364,7 @@ hh:mm:ss arrived in A
             whole().having(grid=None, pose=None, links=frozenset({('A', 'B'), ('A', 'gone')})),
             {},
         ),
-        (FLEET, 96, fleet()['r1'], {'fleet': fleet(), 'robot': 'r1', 'note': 'the last line'}),
+        (OF_A_FLEET, 96, fleet()['r1'], {'fleet': fleet(), 'robot': 'r1', 'note': 'the last line'}),
         (
             SCORES,
             60,
@@ -297,63 +523,6 @@ def test_the_colours_of_a_map_tell_what_is_what() -> None:
     assert {'dodger_blue3', 'deep_sky_blue1'} <= {
         each.split(' ')[0] for each in trail['▀'] | trail['▄']
     }
-
-
-@pytest.mark.parametrize(
-    ('box', 'size', 'expected'),
-    [
-        ((0.0, 0.0, 10.0, 10.0), (20, 10), (0.5, 20, 10)),
-        ((0.0, 0.0, 10.0, 4.0), (20, 10), (0.5, 20, 4)),
-        ((0.0, 0.0, 10.0, 4.5), (20, 10), (0.5, 20, 5)),
-        ((-3.0, 2.0, 1.0, 12.0), (20, 10), (0.5, 8, 10)),
-        ((5.0, 5.0, 5.0, 5.0), (20, 10), (1e-6, 1, 1)),
-    ],
-)
-def test_a_frame_is_the_largest_that_fits(
-    box: tuple[float, float, float, float], size: tuple[int, int], expected: tuple[float, int, int]
-) -> None:
-    frame = Viewport.around(box, *size)
-    assert (frame.left, frame.top) == (box[0], box[3])
-    assert (frame.scale, frame.columns, frame.rows) == pytest.approx(expected)
-
-
-def test_a_canvas_draws_dots_lines_marks_and_arrows_where_they_are() -> None:
-    frame = Viewport(0.0, 4.0, 0.5, 8, 4)
-    canvas = CharacterCanvas(frame)
-    canvas.dots([(0.1, 3.9), (3.9, 0.1), (-0.1, 2.0), (4.1, 2.0), (2.0, 4.1)], raster.OBSTACLE)
-    canvas.line((0.25, 1.25), (3.75, 1.25), raster.LINK)
-    canvas.line((1.25, 3.75), (1.25, 2.25), raster.TRAIL)
-    plain = [''.join(each.text for each in line) for line in canvas.lines(colours=False)]
-    assert plain == ['* ·     ', '  ·     ', '........', '       *']
-    for number, arrow in enumerate('→↗↑↖←↙↓↘'):
-        canvas.arrow((2.1, 2.9, number * math.pi / 4 + 0.3), raster.Style())
-        assert ''.join(each.text for each in [*canvas.lines(colours=False)][1])[4] == arrow
-    labelled = CharacterCanvas(Viewport(0.0, 4.0, 0.5, 8, 4))
-    for _ in range(6):
-        labelled.label(2.1, 2.1, 'name', raster.Style())
-    rows = [''.join(each.text for each in line) for line in labelled.lines(colours=False)]
-    assert rows == ['   name ', '   name ', '   name ', '   name ']
-    narrow = CharacterCanvas(Viewport(0.0, 4.0, 0.5, 3, 4))
-    narrow.label(0.1, 2.1, 'name', raster.Style())
-    assert not any(''.join(each.text for each in line).strip() for line in narrow.lines())
-
-
-def test_a_grid_is_drawn_as_its_own_cells_where_they_are_as_large() -> None:
-    rng = np.random.default_rng(3)
-    cells = rng.choice(np.array([-1, 0, 100], np.int8), (12, 9))
-    grid = Grid(cells, 0.5, (1.0, 2.0))
-    picture = raster.rasterise(grid, Viewport(1.0, 8.0, 0.5, 9, 6))
-    kinds = np.where(cells == 100, raster.WALL, np.where(cells == 0, raster.FREE, raster.UNKNOWN))
-    assert (picture == kinds[::-1]).all()
-    halved = raster.rasterise(grid, Viewport(1.0, 8.0, 1.0, 5, 3))
-    for row in range(6):
-        for column in range(5):
-            block = kinds[::-1][2 * row : 2 * row + 2, 2 * column : 2 * column + 2]
-            assert halved[row, column] == block.max()
-    beyond = raster.rasterise(grid, Viewport(1.0, 8.0, 0.5, 11, 7))
-    assert (beyond[:12, :9] == picture).all()
-    assert (beyond[12:] == raster.UNKNOWN).all()
-    assert (beyond[:, 9:] == raster.UNKNOWN).all()
 
 
 def test_without_anything_there_is_no_map_and_a_note_of_what_is_missing() -> None:

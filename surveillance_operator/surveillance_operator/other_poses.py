@@ -16,7 +16,7 @@ from surveillance_runtime.qos import STATE_QOS
 POSE_TYPE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 
 
-class OtherRobots:
+class OtherPoses:
     """Hears the poses of robots of other namespaces.
 
     Args:
