@@ -4,8 +4,8 @@
     python benchmarks/surveil.py                  # all tables but the week
     python benchmarks/surveil.py --only week      # a week in which nothing happens: ten minutes
 
-An observer without ROS (`Watcher`) goes about the seven rooms: sweeps of the simulated lidar at
-poses that localisation would tell (2 cm and 0.6 degrees off), pictures of the simulated camera.
+An observer without ROS (`ChangeMonitor`) goes about the seven rooms: sweeps of the simulated lidar
+at poses that localisation would tell (2 cm and 0.6 degrees off), pictures of the simulated camera.
 Real data beside it: photographs and scanned maps of `--shared`, and the pictures of scikit-image.
 """
 
@@ -36,6 +36,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import Grid, Marker
+from indoor_watch.change_monitor import ChangeMonitor
 from indoor_watch.day_book import DayBook
 from indoor_watch.events import Event, EventBook
 from indoor_watch.evidence import EvidenceStore
@@ -45,7 +46,6 @@ from indoor_watch.persons import load_finder
 from indoor_watch.viewpoints import Viewpoints
 from indoor_watch.views import view_changes
 from indoor_watch.watch_rules import rule_from
-from indoor_watch.watcher import Watcher
 from indoor_watch.ways import Ways
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
@@ -154,7 +154,7 @@ class Rounds:
         self.cpu_view: list[float] = []
         self.markers_read = 0
         self.detector = MarkerDetector(DetectorSettings(dictionary=world.plan.marker_dictionary))
-        self.watcher = Watcher(
+        self.watcher = ChangeMonitor(
             [rule_from(each) for each in rules],
             self.book,
             local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
@@ -469,9 +469,9 @@ def measure_things(trials: int) -> list[list[str]]:
 # --- persons ---
 
 
-def watcher_of(rule: dict[str, str], told: list[Observation]) -> Watcher:
+def watcher_of(rule: dict[str, str], told: list[Observation]) -> ChangeMonitor:
     """Return a watcher by one rule, without rooms and doors, that tells what it sees to a list."""
-    return Watcher(
+    return ChangeMonitor(
         [rule_from(rule)],
         EventBook(),
         local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
@@ -732,7 +732,7 @@ def measure_markers(trials: int) -> list[list[str]]:
                 aside: float = 0.0,
                 at: tuple[float, float] = at,
                 ahead: float = yaw,
-                watcher: Watcher = watcher,
+                watcher: ChangeMonitor = watcher,
                 home: Any = home,
             ) -> list[Any]:
                 yaw = ahead + aside
@@ -1282,14 +1282,14 @@ def measure_month(days: int) -> list[list[str]]:
                 )
                 counts.take(seen)
                 event = book.take(
-                    seen, severity=2 if kind == Kind.OBJECT else 0, rule='r', look=each
+                    seen, severity=2 if kind == Kind.OBJECT else 0, rule='r', visit=each
                 )
                 if event is not None and each % 80 == 0:
                     book.end(event.number, stamp)
             if day in took:
                 took[day] = (time.process_time() - begun) / (24 * 400)
                 memory[day] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        kept = len(json.dumps({'book': book.to_json(), 'days': counts.to_json()}))
+        kept = len(json.dumps({'book': book.state(), 'days': counts.state()}))
         rows = [[f'{days} days', 'aim', 'reached']]
         rows.append(['pictures on the disk, MB', '1000', f'{store.total / 1e6:.0f}'])
         rows.append(['state file, MB', '', f'{kept / 1e6:.2f}'])

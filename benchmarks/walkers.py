@@ -32,10 +32,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import Grid
+from indoor_watch.change_monitor import ChangeMonitor
 from indoor_watch.events import EventBook
 from indoor_watch.observations import Kind, Observation
-from indoor_watch.watcher import Watcher
-from lidar_navigation import Localiser, MapBuilder
+from lidar_navigation.exploration.map_building import MapBuilder
 from lidar_navigation.geometry import Pose, Scan
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.simulated_place import read_simulated_place
@@ -143,7 +143,7 @@ def watch(log: list[Sweep], pictures: Path | None, name: str) -> tuple[int, list
     grid = mapped(log)
     localiser = Localiser(grid, log[0].pose)
     told: list[Observation] = []
-    watcher = Watcher(
+    watcher = ChangeMonitor(
         [],
         EventBook(),
         local=lambda stamp: datetime.fromtimestamp(stamp, UTC),

@@ -30,9 +30,11 @@ from std_msgs.msg import Bool, String
 from floor_plans import Grid
 from indoor_watch.answers import answered
 from indoor_watch.backlog import Backlog
+from indoor_watch.change_monitor import ChangeMonitor
 from indoor_watch.day_book import DayBook
 from indoor_watch.events import Event, EventBook, EventState
 from indoor_watch.evidence import EvidenceStore
+from indoor_watch.floor_layers import MOST_CELLS, same_map
 from indoor_watch.hung_markers import CameraView, SeenMarker
 from indoor_watch.lost_sight import DROPPED, LATE, NO_POSE, UNREAD, LostSight
 from indoor_watch.marker_checks import MarkerChecks
@@ -41,8 +43,8 @@ from indoor_watch.other_robots import OtherRobots
 from indoor_watch.persons import Person, load_finder
 from indoor_watch.reference_views import ReferenceViews, Viewpoint, same_view
 from indoor_watch.viewpoints import Viewpoints
+from indoor_watch.visit import Coverage
 from indoor_watch.watch_rules import DEFAULT_RULES, Level, read_watch_file
-from indoor_watch.watcher import MOST_CELLS, Look, Watcher, same_map
 from indoor_watch.ways import Ways
 from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import Scan, composed, relative
@@ -269,7 +271,7 @@ class Observer(PatrolNode):
         # Of the last ones that were looked at: when, seconds, and to which bearings, degrees.
         self._seen_sides: deque[tuple[float, int | None]] = deque(maxlen=MOST_SIDES)
         self._doubted: list[dict[str, Any]] = []
-        self._last_looks: dict[str, Look] = {}
+        self._last_looks: dict[str, Coverage] = {}
         self._said = ''
         self._facts: list[EventFact] = []
         self._facts_changed = Interrupt()
@@ -291,7 +293,7 @@ class Observer(PatrolNode):
         self._days = DayBook(datetime.fromtimestamp)
         self.others = OtherRobots(self._settings.radius)
         self._peers: dict[str, StateSubscription[PoseWithCovarianceStamped]] = {}
-        self._watcher = Watcher(
+        self._monitor = ChangeMonitor(
             self._rules(tuple(places)),
             self._book,
             local=datetime.fromtimestamp,
@@ -303,16 +305,16 @@ class Observer(PatrolNode):
             rooms=self._places,
             ways_of=lambda grid: Ways(grid, self._settings.radius, self._doors, places),
             find_persons=self._person_finder(),
-            looked=self._on_look,
+            covered=self._on_coverage,
             store=self._pictures,
             views=self._views(),
             verify_seconds=self._settings.verify_seconds,
             others=self.others,
         )
-        self._marker_checks = MarkerChecks(self._watcher.rules, self._places, self._points)
+        self._marker_checks = MarkerChecks(self._monitor.rules, self._places, self._points)
         self._kept = KeptFile(self._settings.state_file, 'starting without it')
         self._complain(self._kept.read(self._restore))
-        for rule in self._watcher.rules:
+        for rule in self._monitor.rules:
             self.get_logger().info(f'watching: {rule.words()}')
         self._scans: deque[tuple[float, Scan]] = deque(maxlen=10)
         self._poses: deque[tuple[float, PlanarPose]] = deque(maxlen=5)
@@ -435,7 +437,7 @@ class Observer(PatrolNode):
             grid = map_from(message, MOST_CELLS)
 
             def use() -> None:
-                self._watcher.use_map(grid)
+                self._monitor.use_map(grid)
                 if self._grid is None or not same_map(self._grid, grid):
                     self._grid = grid
                     self._places.set_map(grid)
@@ -445,7 +447,7 @@ class Observer(PatrolNode):
 
     def _on_place(self, message: RobotPlace) -> None:
         place, stamp = message.place, self._now()
-        self._work.put(lambda: self._watcher.arrive(place, stamp))
+        self._work.put(lambda: self._monitor.arrive(place, stamp))
 
     def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
         if len(self._scans) == self._scans.maxlen and self._poses:
@@ -532,7 +534,7 @@ class Observer(PatrolNode):
         stamp = self._now()
 
         def compare() -> None:
-            self._watcher.sweep(sensor, ends, met, stamp)
+            self._monitor.sweep(sensor, ends, met, stamp)
             self._lost.count('sweeps')
             self.sweeps += 1
             self.health.figure('sweeps', self.sweeps)
@@ -586,7 +588,7 @@ class Observer(PatrolNode):
         values = (value for each in stood if each is not None for value in each)
         pose = self._camera_pose((*base, *values))
         if pose is not None:
-            self._work.put(lambda: self._watcher.pass_by(pose, found), 'passing')
+            self._work.put(lambda: self._monitor.pass_by(pose, found), 'passing')
 
     def _on_image(self, serialized: bytes) -> None:
         stamp, now = stamp_of_serialized(serialized), time.monotonic()
@@ -734,7 +736,7 @@ class Observer(PatrolNode):
 
     async def _on_command(self, request: Any, response: Any) -> Any:
         def take() -> str:
-            answer = answered(self._book, request.line, self._watcher.answer)
+            answer = answered(self._book, request.line, self._monitor.answer)
             self._teller.answered(request.line, answer)
             self._publish_events()
             return answer
@@ -772,7 +774,7 @@ class Observer(PatrolNode):
         image = image_from_ros(deserialize_message(serialized, Image), MOST_PIXELS)
         picture = np.asarray(image, np.uint8)
         view = None if camera is None else camera.view_of(picture)
-        self._watcher.picture(picture, viewpoint, stamp, markers, view)
+        self._monitor.picture(picture, viewpoint, stamp, markers, view)
 
     def _tell_viewpoints(self, grid: Grid) -> None:
         """Tell from where each place is to be looked at."""
@@ -800,7 +802,7 @@ class Observer(PatrolNode):
     def _tell_checks(self) -> None:
         """Tell from where the spots of markers are to be seen that a rule is about."""
         told: dict[str, list[dict[str, Any]]] = {}
-        for each in self._marker_checks.of(self._watcher.spots()):
+        for each in self._marker_checks.of(self._monitor.spots()):
             told.setdefault(each.place, []).append(each.to_json())
         if told != self._told_checks:
             self._told_checks = told
@@ -808,7 +810,7 @@ class Observer(PatrolNode):
 
     def _door_checks(self, floor: np.ndarray, grid: Grid) -> list[tuple[float, float]]:
         """Return the doors of a room that the rules name."""
-        named = {each.subject for each in self._watcher.rules if each.kind == Kind.DOOR}
+        named = {each.subject for each in self._monitor.rules if each.kind == Kind.DOOR}
         found = []
         for name, (x1, y1, x2, y2) in self._doors.items():
             middle = (x1 + x2) / 2, (y1 + y2) / 2
@@ -864,7 +866,7 @@ class Observer(PatrolNode):
         self._say_what_is_lost()
         self._tell_checks()
         now = self._now()
-        self._watcher.assess(now)
+        self._monitor.assess(now)
         doubts = [
             {
                 'number': each.number,
@@ -872,7 +874,7 @@ class Observer(PatrolNode):
                 'position': each.position,
                 'look_from': self._look_from(each),
             }
-            for each in self._watcher.doubts(now)
+            for each in self._monitor.doubts(now)
         ]
         if doubts != self._doubted:
             self._doubted = doubts
@@ -884,14 +886,14 @@ class Observer(PatrolNode):
         if self._pictures is not None:
             self._pictures.forget_old(self._now())
         if self._kept:
-            state = {**self._watcher.state(), 'days': self._days.to_json()}
+            state = {**self._monitor.state(), 'days': self._days.state()}
             state['book'] = self._teller.kept(state['book'])
             self._complain(self._kept.write(state))
 
     def _restore(self, kept: Mapping[str, Any]) -> None:
         days = DayBook(datetime.fromtimestamp)
         days.restore(kept['days'])
-        self._watcher.restore({**kept, 'book': self._teller.restored(kept['book'])})
+        self._monitor.restore({**kept, 'book': self._teller.restored(kept['book'])})
         self._days = days
         self._teller.take_up(kept['book'], self._book.find)
 
@@ -899,7 +901,7 @@ class Observer(PatrolNode):
         self._days.take(seen)
         self._observations.publish(String(data=json.dumps(seen.to_json())))
 
-    def _on_look(self, look: Look) -> None:
+    def _on_coverage(self, look: Coverage) -> None:
         """Tell what was covered of each place in the last stay there."""
         self._last_looks[look.place] = look
         told = {place: each.to_json() for place, each in sorted(self._last_looks.items())}

@@ -433,7 +433,7 @@ def test_it_tells_which_sides_it_has_seen_and_from_where_a_marker_is_to_be_read(
     pictures = graph.listen(String, 'pictures', STATE_QOS)
     checks = graph.listen(String, 'checks', STATE_QOS)
     spot = HungSpot(21, (5.8, 2.5, 1.0), math.pi, 0.2)
-    monkeypatch.setattr(node._watcher, 'spots', lambda: [spot])
+    monkeypatch.setattr(node._monitor, 'spots', lambda: [spot])
     node._points['R1'] = (1.0, 2.5)
     node._places.set_positions(node._points)
     grid = map_from(room_map(), 100_000)
@@ -465,7 +465,7 @@ def test_a_marker_that_is_read_on_the_way_is_looked_for_where_it_hangs(graph, mo
     message = MarkerDetectionArray(detections=[marker])
     message.header.stamp = eyes.stamp(-0.525)
     eyes.node._on_detections(message)
-    (spot,) = eyes.node._watcher.spots()
+    (spot,) = eyes.node._monitor.spots()
     lens = ARM.camera_frame(ARM.home)[:3, 3]
     assert spot.position == pytest.approx((-0.525 + lens[0] + 2.0, 5.0, lens[2]), abs=0.02)
     assert abs(spot.facing) == pytest.approx(math.pi)

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 
 from floor_plans import Marker
+from indoor_watch.change_monitor import ChangeMonitor
 from indoor_watch.events import Event, EventBook
 from indoor_watch.hung_markers import CameraView, SeenMarker
 from indoor_watch.marker_checks import MarkerChecks
 from indoor_watch.observations import Kind
 from indoor_watch.viewpoints import Viewpoints
 from indoor_watch.watch_rules import rule_from
-from indoor_watch.watcher import Watcher
 from lidar_navigation.localisation.place_locator import PlaceRegions
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
@@ -38,8 +38,6 @@ from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.staging import Stage
 from surveillance_simulation.world.simulated_place import read_simulated_place
 
-from .marked_walls import camera_pose
-
 pytestmark = pytest.mark.early
 
 PLACE = Path(__file__).parents[2] / 'config' / 'patrol_world.yaml'
@@ -49,6 +47,15 @@ SPEED, TURN = 0.5, 2.0
 FIRST_PICTURE, PERIOD = 0.6, 2.0
 """After a turn, and between two pictures, seconds."""
 POSE_ERROR, DOUBT = (0.02, math.radians(0.7)), (0.03, 0.02)
+
+
+def camera_pose(x: float, y: float, yaw: float, height: float) -> np.ndarray:
+    """Return the pose (4, 4) of a camera that looks along the floor."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    pose = np.eye(4)
+    pose[:3, :3] = [[sine, 0, cosine], [-cosine, 0, sine], [0, -1, 0]]
+    pose[:3, 3] = x, y, height
+    return pose
 
 
 class Patrol:
@@ -67,7 +74,7 @@ class Patrol:
         )
         rules = [rule_from({'marker': 'all', 'severity': 'alert'})]
         self.alerts: list[Event] = []
-        self.watcher = Watcher(
+        self.watcher = ChangeMonitor(
             rules,
             EventBook(),
             local=lambda stamp: datetime.fromtimestamp(stamp, UTC),

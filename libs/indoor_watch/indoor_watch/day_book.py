@@ -74,7 +74,7 @@ class DayBook:
             key=lambda each: (each.kind, each.subject, each.place, each.state),
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         """Return all as plain values, for `restore`."""
         return {
             day: [
@@ -85,7 +85,7 @@ class DayBook:
         }
 
     def restore(self, values: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave.
+        """Take what `state` gave.
 
         Raises:
             ValueError, KeyError, TypeError: It is something else; nothing is changed then.

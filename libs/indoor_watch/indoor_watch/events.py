@@ -1,7 +1,7 @@
 """Events: sightings of the same thing over visits and robots, from the first one to its end.
 
 An event is open until a person acknowledges it, calls it normal or false, or it is over: what was
-seen is seen no more, in a look that would have shown it. The book is bounded: of what is over the
+seen is seen no more, in a visit that would have shown it. The book is bounded: of what is over the
 least severe and oldest goes first; what is open stays.
 """
 
@@ -54,7 +54,7 @@ class Event:
         evidence: Of the first and the last sighting.
         compared_with: What the last sighting was compared with; or empty.
         seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
-        confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another look,
+        confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another visit,
             too.
         sensors: What saw it, of a person.
     """
@@ -126,7 +126,7 @@ class EventBook:
         self._over: list[tuple[int, float, int]] = []
         self._normal: dict[_Key, list[Observation]] = {}
         self._next = 1
-        self._looks: dict[int, int] = {}
+        self._visits: dict[int, int] = {}
         self._quiet: set[int] = set()
 
     @property
@@ -138,14 +138,14 @@ class EventBook:
         """Return an event by its number."""
         return self._events.get(number)
 
-    def take(self, seen: Observation, *, severity: int, rule: str, look: int) -> Event | None:
+    def take(self, seen: Observation, *, severity: int, rule: str, visit: int) -> Event | None:
         """Join an observation to its event, or begin one.
 
         Args:
             seen: What was seen.
             severity: What the rules make of it; 0: nothing, it only ends others.
             rule: The rule in words.
-            look: The number of the look, so that two sightings of one look count once.
+            visit: The number of the visit, so that two sightings of one visit count once.
 
         Returns:
             The event; None where it is normal, or of no severity and of no event.
@@ -181,11 +181,11 @@ class EventBook:
                 (seen.sensor,) if seen.sensor else (),
             )
             self._next += 1
-            self._looks[event.number] = look
+            self._visits[event.number] = visit
             self._keep(event)
             return event
-        new_look = self._looks.get(event.number) != look
-        self._looks[event.number] = look
+        new_visit = self._visits.get(event.number) != visit
+        self._visits[event.number] = visit
         first = event.evidence[:1]
         changed = replace(
             event,
@@ -196,14 +196,14 @@ class EventBook:
             began=min(event.began, seen.stamp),
             last=max(event.last, seen.stamp),
             sightings=event.sightings + 1,
-            looks=event.looks + new_look,
+            looks=event.looks + new_visit,
             confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
             robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
             evidence=(*first, seen.evidence) if seen.evidence else event.evidence,
             compared_with=seen.compared_with or event.compared_with,
             confirmed=event.confirmed
             or seen.confidence >= SURE
-            or event.looks + new_look > 1
+            or event.looks + new_visit > 1
             or _from_elsewhere(event, seen),
             sensors=tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ())))),
         )
@@ -233,7 +233,7 @@ class EventBook:
         return event
 
     def end(self, number: int, stamp: float) -> Event | None:
-        """Take that a look would have shown what was seen, and did not; None where it was over.
+        """Take that a visit would have shown what was seen, and did not; None where it was over.
 
         Raises:
             KeyError: There is no such event.
@@ -266,7 +266,7 @@ class EventBook:
         wrong = sum(each.state == EventState.FALSE for each in found)
         return wrong / len(found) if found else 0.0
 
-    def to_json(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         """Return all as plain values, for `restore`."""
         return {
             'events': [each.to_json() for each in self._events.values()],
@@ -276,7 +276,7 @@ class EventBook:
         }
 
     def restore(self, values: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave, in place of all there is.
+        """Take what `state` gave, in place of all there is.
 
         Raises:
             ValueError, KeyError, TypeError: It is something else; nothing is changed then.
@@ -289,7 +289,7 @@ class EventBook:
         self._normal, self._next = {}, following
         for each in normal:
             self._normal.setdefault(_key(each), []).append(each)
-        self._looks, self._quiet = {}, quiet
+        self._visits, self._quiet = {}, quiet
         self._current, self._over = {}, []
         for event in events:
             self._index(event)
@@ -314,7 +314,7 @@ class EventBook:
                 continue
             del self._events[number]
             self._quiet.discard(number)
-            self._looks.pop(number, None)
+            self._visits.pop(number, None)
             self._current.get(_key(least), set()).discard(number)
 
     def _index(self, event: Event) -> None:

@@ -109,7 +109,7 @@ class Habits:
 
     def __init__(self) -> None:
         self._models: dict[str, PeriodicState] = {}
-        self._looks: dict[str, int] = {}
+        self._visits: dict[str, int] = {}
 
     def usual(self, seen: Observation) -> float | None:
         """Return how likely what was seen is at its hour; None: that is not known (yet)."""
@@ -120,22 +120,22 @@ class Habits:
         likely = model.probability(seen.stamp)
         return likely if value else 1.0 - likely
 
-    def learn(self, seen: Observation, look: int) -> None:
-        """Take what was seen; of one look once, since what lasts is no news."""
+    def learn(self, seen: Observation, visit: int) -> None:
+        """Take what was seen; of one visit once, since what lasts is no news."""
         key, value = _key(seen), _value(seen)
-        if value is None or self._looks.get(key) == look:
+        if value is None or self._visits.get(key) == visit:
             return
         if key not in self._models and len(self._models) >= MOST_MODELS:
             return
-        self._looks[key] = look
+        self._visits[key] = visit
         self._models.setdefault(key, PeriodicState()).learn(value, seen.stamp)
 
-    def to_json(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         """Return all as plain values, for `restore`."""
         return {key: model.to_json() for key, model in self._models.items()}
 
     def restore(self, values: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave.
+        """Take what `state` gave.
 
         Raises:
             ValueError, TypeError: It is something else; nothing is changed then.
@@ -143,7 +143,7 @@ class Habits:
         self._models = {
             str(key): PeriodicState.from_json(each) for key, each in dict(values).items()
         }
-        self._looks = {}
+        self._visits = {}
 
 
 def _key(seen: Observation) -> str:

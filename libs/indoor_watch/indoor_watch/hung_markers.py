@@ -395,7 +395,7 @@ class HungMarkers:
         picture: Picture,
         view: CameraView,
         seen: Sequence[SeenMarker],
-        look: int,
+        visit: int,
         is_clear: Callable[[Array], bool] = lambda _: True,
     ) -> list[MarkerFinding]:
         """Take what a picture shows of the markers, and return what is settled by it.
@@ -404,7 +404,7 @@ class HungMarkers:
             picture: The picture.
             view: From where it was taken.
             seen: The markers in it.
-            look: The number of the stay at a place.
+            visit: The number of the visit.
             is_clear: Tells of a point of the map, (3,), whether nothing is known to stand before.
 
         Returns:
@@ -421,7 +421,7 @@ class HungMarkers:
             some = [each for each in by_id.get(number, ()) if each.is_placed]
             if number in by_id and not some:
                 continue  # it is read, and nobody knows where
-            found = self._judge(number, some, shown, look, is_clear)
+            found = self._judge(number, some, shown, visit, is_clear)
             if found is not None:
                 settled.append(found)
         return settled
@@ -431,12 +431,12 @@ class HungMarkers:
         number: int,
         some: Sequence[SeenMarker],
         shown: _Shown,
-        look: int,
+        visit: int,
         is_clear: Callable[[Array], bool],
     ) -> MarkerFinding | None:
         spot = self._spots.get(number)
         if spot is None or not (spot.is_given or spot.pictures >= AGREED):
-            self._begin(number, spot, some, shown, look)
+            self._begin(number, spot, some, shown, visit)
             return None
         here, away = self._sorted(spot, some, shown)
         if here is not None:
@@ -463,7 +463,7 @@ class HungMarkers:
         else:
             known = self._away.get(number)
             agreed = count >= READ and (known is None or known.read >= READ)
-        found = self._settled(number, spot, state, agreed, look)
+        found = self._settled(number, spot, state, agreed, visit)
         self._note_open(number, here is None and found is None and number not in self._gone)
         return found
 
@@ -474,7 +474,7 @@ class HungMarkers:
             self._open.discard(number)
 
     def _begin(
-        self, number: int, spot: _Spot | None, some: Sequence[SeenMarker], shown: _Shown, look: int
+        self, number: int, spot: _Spot | None, some: Sequence[SeenMarker], shown: _Shown, visit: int
     ) -> None:
         """Learn where a marker hangs; one picture alone may be off by far."""
         if len(some) != 1 or (spot is None and not self._makes_way()):
@@ -483,7 +483,7 @@ class HungMarkers:
             here, _ = self._sorted(spot, some, shown)
             if here is not None:
                 self._learn(spot, here, shown)
-                self._read_at[number] = look
+                self._read_at[number] = visit
                 return
         position, covariance = shown.placed(some[0])
         self._spots[number] = _Spot(some[0].side, position, covariance)
@@ -546,12 +546,12 @@ class HungMarkers:
                 del self._away[number]
 
     def _settled(
-        self, number: int, spot: _Spot, state: str, agreed: bool, look: int
+        self, number: int, spot: _Spot, state: str, agreed: bool, visit: int
     ) -> MarkerFinding | None:
         away = self._away.get(number)
         at = spot.position if away is None else away.position
         if state == 'here':
-            self._read_at[number] = look
+            self._read_at[number] = visit
             if number in self._gone:
                 # It was gone, and has come back.
                 self._gone.discard(number)
@@ -567,13 +567,13 @@ class HungMarkers:
         elif state == 'elsewhere':
             if number in self._gone or (spot.is_given and number not in self._read_at):
                 state = 'moved'
-            elif self._read_at.get(number) == look:
+            elif self._read_at.get(number) == visit:
                 state = 'double'
             else:
                 return None  # nothing shows whether it hangs there instead or as well
         return MarkerFinding(number, state, _plain(at))
 
-    def to_json(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         """Return where they hang and how that looks as plain values, for `restore`."""
         spots = {
             str(number): {
@@ -590,7 +590,7 @@ class HungMarkers:
         return {'spots': spots, 'accepted': accepted}
 
     def restore(self, values: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave.
+        """Take what `state` gave.
 
         Where a marker hangs by its file stays, unless a person accepted otherwise since the file
         says so.

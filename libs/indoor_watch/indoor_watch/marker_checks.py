@@ -15,8 +15,8 @@ from typing import Any
 from indoor_watch.hung_markers import HungSpot
 from indoor_watch.observations import Kind
 from indoor_watch.viewpoints import Spot, Viewpoints
+from indoor_watch.visit import Rooms
 from indoor_watch.watch_rules import WatchRule
-from indoor_watch.watcher import Rooms
 
 SAME_SPOT = 0.3
 """A spot that is so near to where it was, metres, is looked at from the same point, as long as it

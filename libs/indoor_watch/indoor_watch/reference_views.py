@@ -38,8 +38,8 @@ class ReferenceView:
         picture: What it showed, at most `WIDTH` wide.
         stamp: When, seconds since 1970.
         doors: The states of the doors nearby.
-        differed: The parts that differed in all pictures of a look, for the last two looks: the
-            number of the look, and the boxes in the reference (left, top, width, height), pixels.
+        differed: The parts that differed in all pictures of a visit, for the last two: the
+            number of the visit, and the boxes in the reference (left, top, width, height), pixels.
     """
 
     name: str
@@ -49,34 +49,34 @@ class ReferenceView:
     doors: Mapping[str, str] = field(default_factory=dict)
     differed: list[tuple[int, list[Box]]] = field(default_factory=list)
 
-    def lasts(self, box: Box, look: int) -> bool:
-        """Tell whether a part differed throughout this look so far, and the look before it."""
-        looks = dict(self.differed)
-        earlier = [each for each in looks if each < look]
+    def lasts(self, box: Box, visit: int) -> bool:
+        """Tell whether a part differed throughout this visit so far, and the visit before it."""
+        visits = dict(self.differed)
+        earlier = [each for each in visits if each < visit]
         return all(
-            any(_overlap(box, other) >= SAME_PART for other in looks.get(each, ()))
-            for each in (look, max(earlier, default=look - 1))
+            any(_overlap(box, other) >= SAME_PART for other in visits.get(each, ()))
+            for each in (visit, max(earlier, default=visit - 1))
         )
 
-    def note(self, boxes: list[Box], doubtful: list[Box], look: int) -> None:
+    def note(self, boxes: list[Box], doubtful: list[Box], visit: int) -> None:
         """Take which parts differ in a picture that could be compared.
 
-        What some pictures of one look show and others do not, is somebody who walks by: of each
-        look the parts are kept that differ in all its pictures.
+        What some pictures of one visit show and others do not, is somebody who walks by: of each
+        visit the parts are kept that differ in all its pictures.
 
         Args:
             boxes: The parts that show something else.
             doubtful: The parts that may differ by their light alone: a thing may be hidden there.
-            look: The number of the look.
+            visit: The number of the visit.
         """
-        earlier = [each for each in self.differed if each[0] < look][-1:]
-        standing = dict(self.differed).get(look)
+        earlier = [each for each in self.differed if each[0] < visit][-1:]
+        standing = dict(self.differed).get(visit)
         if standing is not None:
             now = [*boxes, *doubtful]
             boxes = [
                 box for box in standing if any(_overlap(box, other) >= SAME_PART for other in now)
             ]
-        self.differed = [*earlier, (look, boxes)]
+        self.differed = [*earlier, (visit, boxes)]
 
 
 class ReferenceViews:
@@ -158,7 +158,7 @@ class ReferenceViews:
             with contextlib.suppress(OSError):
                 self._path(self._folder, name).unlink(missing_ok=True)
 
-    def to_json(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         """Return all but the pictures as plain values, for `restore`."""
         views = [
             {
@@ -172,7 +172,7 @@ class ReferenceViews:
         return {'views': views, 'next': self._next}
 
     def restore(self, values: Mapping[str, Any]) -> None:
-        """Take what `to_json` gave; a view whose picture is gone is left out.
+        """Take what `state` gave; a view whose picture is gone is left out.
 
         Raises:
             ValueError, KeyError, TypeError: It is something else; nothing is changed then.

@@ -13,7 +13,7 @@ from indoor_watch.views import Sight, light_of, sight_of, view_changes
 
 pytestmark = pytest.mark.early
 
-PHOTOS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'photos').glob('*.jpg'))[:12]
+PHOTOS = sorted((Path(__file__).resolve().parents[4] / 'shared' / 'photos').glob('*.jpg'))[:12]
 needs_photos = pytest.mark.skipif(not PHOTOS, reason='the shared photographs are not there')
 
 

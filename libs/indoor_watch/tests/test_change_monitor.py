@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from floor_plans import Grid
+from indoor_watch.change_monitor import ChangeMonitor
 from indoor_watch.events import EventBook, EventState
 from indoor_watch.evidence import EvidenceStore
 from indoor_watch.hung_markers import CameraView
@@ -23,8 +24,8 @@ from indoor_watch.observations import Kind, Observation
 from indoor_watch.other_robots import OtherRobots
 from indoor_watch.persons import Person
 from indoor_watch.reference_views import ReferenceViews
+from indoor_watch.visit import Coverage
 from indoor_watch.watch_rules import rule_from
-from indoor_watch.watcher import Look, Watcher
 from indoor_watch.ways import Ways
 
 from .marked_walls import camera, camera_pose, hang, seen_at, wall
@@ -118,12 +119,12 @@ class Round:
         rooms: Halves | None = None,
     ) -> None:
         self.others = OtherRobots(0.25)
-        self.looks: list[Look] = []
+        self.looks: list[Coverage] = []
         self.told: list[Observation] = []
         self.alerts: list[int] = []
         self.book = EventBook()
         self.time = 1_000_000.0
-        self.watcher = Watcher(
+        self.watcher = ChangeMonitor(
             [rule_from(each) for each in yaml.safe_load(RULES)],
             self.book,
             local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
@@ -140,7 +141,7 @@ class Round:
             ),
             find_persons=find_persons,
             verify_seconds=verify_seconds,
-            looked=self.looks.append,
+            covered=self.looks.append,
             others=self.others,
         )
         self.watcher.use_map(room())
@@ -882,7 +883,7 @@ def test_whom_the_camera_saw_is_there_until_pictures_show_nobody(found, sides, o
     assert event.sensors == ('lidar' if found == 'walks' else 'camera',)
     assert event.state == (EventState.OVER if over else EventState.OPEN)
     again = EventBook()
-    again.restore(json.loads(json.dumps(watch.book.to_json())))
+    again.restore(json.loads(json.dumps(watch.book.state())))
     assert again.events == watch.book.events
 
 
@@ -922,7 +923,7 @@ def test_one_who_stood_there_is_over_when_the_lidar_passes_through_where_they_st
     seen = Observation(
         Kind.PERSON, 'seen', 'R1', '', at, confidence=0.9, stamp=watch.time, sensor='camera'
     )
-    event = watch.book.take(seen, severity=3, rule='', look=1)
+    event = watch.book.take(seen, severity=3, rule='', visit=1)
     assert event is not None
     watch.visit('R1', HERE, boxes=[(*at, 0.1)])
     assert watch.book.find(event.number).state == EventState.OPEN

@@ -176,7 +176,7 @@ def test_what_stands_is_not_fresh_for_long_though_the_clock_was_set_back(office)
     assert not gathered.fresh(sensor, spot).any()
 
 
-MAPS = sorted((Path(__file__).resolve().parents[3] / 'shared' / 'maps').glob('*_scan.png'))
+MAPS = sorted((Path(__file__).resolve().parents[4] / 'shared' / 'maps').glob('*_scan.png'))
 
 
 @pytest.mark.skipif(not MAPS, reason='the shared maps are not there')

@@ -24,7 +24,7 @@ def seen(kind=Kind.OBJECT, state='appeared', **more) -> Observation:
 
 
 def take(book: EventBook, observation: Observation, severity: int = 2, look: int = 1):
-    return book.take(observation, severity=severity, rule='no boxes here', look=look)
+    return book.take(observation, severity=severity, rule='no boxes here', visit=look)
 
 
 def test_sightings_of_one_thing_are_one_event():
@@ -71,7 +71,7 @@ def test_a_person_calls_it_normal_and_it_stays_so():
     book.answer(event.number, EventState.NORMAL)
     assert take(book, seen(stamp=900.0), look=2) is None
     again = EventBook()
-    again.restore(json.loads(json.dumps(book.to_json())))
+    again.restore(json.loads(json.dumps(book.state())))
     assert take(again, seen(stamp=950.0), look=3) is None
     assert again.events == book.events
     with pytest.raises(ValueError, match='by hand'):
@@ -146,7 +146,7 @@ def test_what_goes_on_is_found_among_a_month_of_what_is_over_and_after_a_restart
     assert len(book.events) == 300
     assert [each.number for each in book.current] == [8]
     again = EventBook(most=300)
-    again.restore(json.loads(json.dumps(book.to_json())))
+    again.restore(json.loads(json.dumps(book.state())))
     for each in (book, again):
         assert take(each, seen(position=(0.0, 14.0), stamp=2000.0), 1, 3).number == 8
         new = take(each, seen(position=(0.0, 90.0), stamp=2001.0), 1, 3)

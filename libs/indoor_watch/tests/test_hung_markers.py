@@ -182,7 +182,7 @@ def test_what_a_person_calls_normal_is_how_it_hangs():
 
 def test_it_outlives_a_restart_and_refuses_what_is_none(hung):
     markers, picture, seen, empty = hung
-    kept = json.loads(json.dumps(markers.to_json()))
+    kept = json.loads(json.dumps(markers.state()))
     again = HungMarkers()
     again.restore(kept)
     assert told(again, picture, [seen]) == ['here']
@@ -204,7 +204,7 @@ def test_a_persons_word_about_a_marker_of_the_file_outlives_a_restart_until_the_
     assert told(markers, picture, [there]) == ['moved']
     markers.accept(14)
     again = HungMarkers({14: at})
-    again.restore(json.loads(json.dumps(markers.to_json())))
+    again.restore(json.loads(json.dumps(markers.state())))
     is_as_before = at == (-2.0, 0.0, 1.0)
     assert told(again, picture, [there]) == ['here' if is_as_before else 'moved']
 
@@ -230,9 +230,9 @@ def test_a_panel_of_another_size_is_judged_by_its_own():
 )
 def test_a_camera_that_is_nowhere_tells_nothing_and_spoils_nothing(change):
     markers, picture, seen = learned(wall)
-    before = markers.to_json()
+    before = markers.state()
     assert told(markers, picture, [seen], view=camera(**change)) == []
-    assert markers.to_json() == before
+    assert markers.state() == before
 
 
 @pytest.mark.parametrize(
@@ -246,9 +246,9 @@ def test_a_camera_that_is_nowhere_tells_nothing_and_spoils_nothing(change):
 )
 def test_what_no_camera_measures_is_no_marker(change):
     markers, picture, seen = learned(wall)
-    before = markers.to_json()
+    before = markers.state()
     assert told(markers, picture, [replace(seen, **change)]) == []
-    assert markers.to_json() == before
+    assert markers.state() == before
 
 
 def test_a_month_of_misreadings_leaves_room_for_a_marker():
@@ -258,7 +258,7 @@ def test_a_month_of_misreadings_leaves_room_for_a_marker():
         markers.take(picture, camera(), [replace(seen, number=number)], 1)
     assert told(markers, picture, [seen], 2) == []
     assert told(markers, picture, [seen], 3) == ['here']
-    assert len(markers.to_json()['spots']) == MOST
+    assert len(markers.state()['spots']) == MOST
 
 
 def test_one_picture_that_is_far_off_decides_nothing():

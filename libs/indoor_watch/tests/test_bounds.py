@@ -31,7 +31,7 @@ NOON = datetime(2026, 11, 25, 12, 0)  # a Wednesday
 
 
 def take(book: EventBook, seen: Observation, severity: int = 2, look: int = 1) -> Any:
-    return book.take(seen, severity=severity, rule='a rule', look=look)
+    return book.take(seen, severity=severity, rule='a rule', visit=look)
 
 
 # --- events ---
@@ -362,7 +362,7 @@ def test_a_day_counts_each_thing_in_each_state() -> None:
     assert len(days) == 60
     assert days[-1] == '2026-05-09'
     again = DayBook(lambda stamp: datetime.fromtimestamp(stamp, UTC))
-    again.restore(book.to_json())
+    again.restore(book.state())
     assert again.days() == days
     assert again.seen_on(days[0]) == book.seen_on(days[0])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from indoor_watch.observations import Kind
 
-from .test_watcher import HERE, Round, beams, texture
+from .test_change_monitor import HERE, Round, beams, texture
 
 
 def drive_past(watch: Round, heard: bool, boxes=()) -> None:

@@ -1,4 +1,4 @@
-"""The parts of the watcher that decide by numbers: agreement, spots, sight, and what is kept."""
+"""The parts that decide by numbers: agreement, spots, sight, a visit, and what is kept."""
 
 from __future__ import annotations
 
@@ -6,26 +6,18 @@ import base64
 import math
 import zlib
 from dataclasses import replace
-from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 import pytest
 
 from floor_plans import Grid
-from indoor_watch.events import EventBook
+from indoor_watch.agreement import Agreement
 from indoor_watch.floor import FloorView
+from indoor_watch.floor_layers import MOST_CELLS, check, packed, same_map, unpacked
+from indoor_watch.floor_monitor import FloorMonitor, is_free
+from indoor_watch.marker_monitor import stands_before
 from indoor_watch.observations import Kind, Observation
-from indoor_watch.watcher import (
-    MOST_CELLS,
-    Look,
-    Watcher,
-    _Agreement,
-    _masks,
-    _packed,
-    _unpacked,
-    same_map,
-)
+from indoor_watch.visit import Coverage, LidarSweep, Visit
 
 from .marked_walls import camera
 
@@ -35,14 +27,6 @@ def hall() -> Grid:
     cells = np.zeros((40, 60), np.int8)
     cells[[0, -1], :] = cells[:, [0, -1]] = 100
     return Grid(cells, 0.1, (-1.0, 2.0))
-
-
-def watcher(**more: Any) -> Watcher:
-    found = Watcher(
-        [], EventBook(), local=lambda stamp: datetime.fromtimestamp(stamp, UTC), robot='R', **more
-    )
-    found.use_map(hall())
-    return found
 
 
 @pytest.mark.parametrize(
@@ -63,13 +47,13 @@ def watcher(**more: Any) -> Watcher:
 def test_pictures_agree_three_in_a_row_or_two_of_one_stay_some_time_apart(
     pictures: list[tuple[str, int, float]], settled: bool
 ) -> None:
-    agreement: _Agreement[str] = _Agreement()
+    agreement: Agreement[str] = Agreement()
     told = [agreement.take(*each) for each in pictures]
     assert told[-1] is settled
 
 
 def test_a_look_is_told_without_what_is_not_known() -> None:
-    look = Look('R1', 10.00049, 20.5, 0.12345, 3.456, 7, math.nan)
+    look = Coverage('R1', 10.00049, 20.5, 0.12345, 3.456, 7, math.nan)
     assert look.to_json() == {
         'place': 'R1', 'began': 10.0, 'ended': 20.5, 'area': 3.46, 'pictures': 7, 'share': 0.123,
     }  # fmt: skip
@@ -96,42 +80,44 @@ def view(seed: int = 1) -> FloorView:
 
 def test_what_is_normal_is_packed_and_unpacked_on_its_own_map_alone() -> None:
     before = view()
-    packed = _packed(before)
-    after = _unpacked(packed, hall())
+    kept = packed(before)
+    after = unpacked(kept, hall())
     assert after is not None
     assert (after.occupied == before.occupied).all()
     assert (after.free == before.free).all()
     assert not after.moving.any()
-    assert len(packed['occupied']) < 600, 'bits, compressed'
+    assert len(kept['occupied']) < 600, 'bits, compressed'
     for other in (
         Grid(hall().cells[:-1], 0.1, (-1.0, 2.0)),
         Grid(hall().cells, 0.2, (-1.0, 2.0)),
         Grid(hall().cells, 0.1, (-1.0, 2.5)),
     ):
-        assert _unpacked(packed, other) is None
+        assert unpacked(kept, other) is None
 
 
 def test_a_damaged_layer_is_refused_in_one_line() -> None:
-    packed = _packed(view())
-    _masks(packed)
+    kept = packed(view())
+    check(kept)
     broken = base64.b64encode(b'nothing').decode()
     with pytest.raises(ValueError, match=r'^a layer of the map: '):
-        _masks({**packed, 'free': broken})
+        check({**kept, 'free': broken})
     for length in (299, 301):
         short = base64.b64encode(zlib.compress(bytes(length))).decode()
         with pytest.raises(
             ValueError, match=rf'^a layer of the map of {length} bytes, not 40 by 60$'
         ):
-            _masks({**packed, 'occupied': short})
+            check({**kept, 'occupied': short})
     for shape in ([10**9, 10**6], [-40, -60]):
         with pytest.raises(ValueError, match=r'^a layer of the map of 300 bytes, not '):
-            _masks({**packed, 'shape': shape})
+            check({**kept, 'shape': shape})
     huge = zlib.compress(bytes(MOST_CELLS // 4))
-    for wrong in (packed['occupied'][:40], base64.b64encode(huge).decode()):
+    for wrong in (kept['occupied'][:40], base64.b64encode(huge).decode()):
         with pytest.raises(ValueError, match=r'^a layer of the map: cut off, or of more than 25'):
-            _masks({**packed, 'occupied': wrong})
+            check({**kept, 'occupied': wrong})
     whole = base64.b64encode(zlib.compress(bytes(300))).decode()
-    assert not _masks({**packed, 'free': whole})[1].any()
+    empty = unpacked({**kept, 'free': whole}, hall())
+    assert empty is not None
+    assert not empty.free.any()
 
 
 @pytest.mark.parametrize(
@@ -153,9 +139,9 @@ def test_a_spot_is_free_where_beams_passed_through_nearly_all_of_it(
     passed[18], passed[22], passed[:, 28], passed[:, 32] = False, False, False, False
     now = FloorView(hall(), ~passed & False, passed, ~passed & False)
     at = hall().centre_of(20, 30)
-    assert watcher()._is_free(now, at) is free
-    assert not watcher()._is_free(now, (50.0, 50.0)), 'of another map'
-    assert watcher()._is_free(replace(now, free=passed | True), hall().centre_of(0, 59))
+    assert is_free(now, at) is free
+    assert not is_free(now, (50.0, 50.0)), 'of another map'
+    assert is_free(replace(now, free=passed | True), hall().centre_of(0, 59))
 
 
 @pytest.mark.parametrize(('column', 'anew'), [(30, True), (33, True), (35, False), (25, False)])
@@ -164,12 +150,12 @@ def test_something_stands_anew_near_a_spot(column: int, anew: bool) -> None:
     met = nothing.copy()
     met[20, column] = True
     now = FloorView(hall(), met, ~met, nothing)
-    found = watcher()
-    found._normal = FloorView(hall(), nothing, ~nothing, nothing)
-    # Nearer than 0.4 m, from middle to middle.
-    assert found._stands_anew(now, hall().centre_of(20, 30)) is anew
-    found._normal = replace(found._normal, occupied=met)
-    assert not found._stands_anew(now, hall().centre_of(20, 30)), 'it always stood there'
+    found = FloorMonitor(lambda _: False)
+    found.normal = FloorView(hall(), nothing, ~nothing, nothing)
+    # Nearer than 0.4 m, from middle to middle; what is met in a cell leaves the spot free enough.
+    assert found.is_as_before(hall().centre_of(20, 30), now) is not anew
+    found.normal = replace(found.normal, occupied=met)
+    assert found.is_as_before(hall().centre_of(20, 30), now), 'it always stood there'
 
 
 @pytest.mark.parametrize(
@@ -186,28 +172,30 @@ def test_something_stands_anew_near_a_spot(column: int, anew: bool) -> None:
 def test_what_the_lidar_meets_on_the_line_of_sight_hides_a_marker(
     met: tuple[float, float], hidden: bool
 ) -> None:
-    found = watcher()
     marker = np.array([2.0, 0.0, 1.0])
-    assert not found._stands_before(camera(), marker)
-    found._last = (0.0, 0.0), np.array([[9.0, 9.0], met])
-    assert found._stands_before(camera(), marker) is hidden
+    assert not stands_before(camera(), marker, np.zeros((0, 2)))
+    assert stands_before(camera(), marker, np.array([[9.0, 9.0], met])) is hidden
 
 
 def seen(state: str, stamp: float, at: tuple[float, float] | None = None) -> Observation:
     return Observation(Kind.OBJECT, state, 'R1', '', at, 0.9, stamp)
 
 
+def sweep_at(x: float, y: float) -> LidarSweep:
+    return LidarSweep((x, y), np.zeros((0, 2)), np.zeros(0, np.bool_), 100.0)
+
+
 def test_a_thing_is_told_again_after_some_time_or_from_elsewhere_or_otherwise() -> None:
-    found = watcher()
-    found._at = (1.0, 3.0)
-    assert found._is_due(seen('appeared', 100.0, (2.0, 4.0)))
-    assert not found._is_due(seen('appeared', 109.9, (2.0, 4.0)))
-    assert not found._is_due(seen('appeared', 90.1, (2.2, 4.3))), 'the same square metre'
-    assert found._is_due(seen('appeared', 100.0, (3.0, 4.0)))
-    assert found._is_due(seen('removed', 100.0, (2.0, 4.0)))
-    assert found._is_due(seen('appeared', 100.0))
-    assert found._is_due(seen('appeared', 100.0, (2.0, 4.0)), 'both')
-    assert found._is_due(seen('appeared', 110.0, (2.0, 4.0)))
-    assert not found._is_due(seen('appeared', 111.0, (2.0, 4.0)))
-    found._at = (1.0, 30.0)
-    assert found._is_due(seen('appeared', 111.0, (2.0, 4.0)))
+    found = Visit()
+    found.sweep = sweep_at(1.0, 3.0)
+    assert found.is_due(seen('appeared', 100.0, (2.0, 4.0)))
+    assert not found.is_due(seen('appeared', 109.9, (2.0, 4.0)))
+    assert not found.is_due(seen('appeared', 90.1, (2.2, 4.3))), 'the same square metre'
+    assert found.is_due(seen('appeared', 100.0, (3.0, 4.0)))
+    assert found.is_due(seen('removed', 100.0, (2.0, 4.0)))
+    assert found.is_due(seen('appeared', 100.0))
+    assert found.is_due(seen('appeared', 100.0, (2.0, 4.0)), 'both')
+    assert found.is_due(seen('appeared', 110.0, (2.0, 4.0)))
+    assert not found.is_due(seen('appeared', 111.0, (2.0, 4.0)))
+    found.sweep = sweep_at(1.0, 30.0)
+    assert found.is_due(seen('appeared', 111.0, (2.0, 4.0)))

@@ -80,6 +80,6 @@ def test_nothing_is_said_after_a_few_visits_and_what_was_learned_outlives_a_rest
         habits.learn(door(MONDAY + timedelta(hours=number), 'closed'), number)
     assert habits.usual(door(MONDAY, 'open')) is None
     month_of_visits(habits)
-    again.restore(json.loads(json.dumps(habits.to_json())))
+    again.restore(json.loads(json.dumps(habits.state())))
     moment = MONDAY + timedelta(weeks=5, hours=26)
     assert again.usual(door(moment, 'open')) == habits.usual(door(moment, 'open'))

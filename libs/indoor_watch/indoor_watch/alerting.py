@@ -1,0 +1,158 @@
+"""What is made of an observation: how usual it is, which rule it breaks, its event, who is called.
+
+An alert that one look alone does not make sure waits for a second look.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import Any, Protocol
+
+from indoor_watch.events import Event, EventBook, EventState
+from indoor_watch.evidence import EvidenceStore, side_by_side
+from indoor_watch.habits import Habits
+from indoor_watch.observations import Observation
+from indoor_watch.persons import Picture
+from indoor_watch.visit import Noted, Visit
+from indoor_watch.watch_rules import Level, WatchRule, severity_of
+
+Drawn = Callable[[tuple[float, float], Visit], tuple[Picture, Picture | None] | None]
+"""Draws what a lidar met around a point of the map, and what stands there normally."""
+
+
+class Alerting:
+    """Judges observations by the rules; owned by whoever calls it, one thread.
+
+    Args:
+        rules: What matters.
+        book: Joins what was seen to events.
+        local: Returns the local time of a stamp.
+        robot: Whose observations they are.
+        tell: Called with each observation.
+        alert: Called with each event of level ALERT that lasts as long as its rule wants.
+        store: Keeps pictures; None: nothing is kept.
+        drawn: Draws what has no picture.
+        verify_seconds: An alert that is not sure waits so long for a second look.
+    """
+
+    def __init__(
+        self,
+        rules: Sequence[WatchRule],
+        book: EventBook,
+        *,
+        local: Callable[[float], datetime],
+        robot: str,
+        tell: Callable[[Observation], object],
+        alert: Callable[[Event], object],
+        store: EvidenceStore | None,
+        drawn: Drawn,
+        verify_seconds: float,
+    ) -> None:
+        self.rules, self.book = tuple(rules), book
+        self._local, self._robot, self._tell, self._alert = local, robot, tell, alert
+        self._store, self._drawn = store, drawn
+        self._verify_seconds = verify_seconds
+        self._habits = Habits()
+        self._doubts: dict[int, float] = {}
+
+    def take(self, noted: Iterable[Noted], visit: Visit) -> None:
+        """Take what was noticed in a visit."""
+        for each in noted:
+            self._take(each, visit)
+
+    def _take(self, noted: Noted, visit: Visit) -> None:
+        seen = replace(noted.seen, usual=self._habits.usual(noted.seen))
+        self._habits.learn(seen, visit.number)
+        severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
+        evidence = self._keep(noted, severity, visit) if severity else ''
+        seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=visit.at)
+        self._tell(seen)
+        words = '' if rule is None else rule.words()
+        event = self.book.take(seen, severity=severity, rule=words, visit=visit.number)
+        if event is None or rule is None or event.state != EventState.OPEN:
+            return
+        lasts = rule.lasting(event.looks, event.last - event.began)
+        if event.severity >= Level.ALERT and lasts:
+            if event.confirmed or not self._verify_seconds:
+                self._doubts.pop(event.number, None)
+                self._alert(event)
+            else:
+                self._doubts.setdefault(event.number, seen.stamp + self._verify_seconds)
+
+    def _keep(self, noted: Noted, severity: int, visit: Visit) -> str:
+        """Keep a picture, and return its file; empty: there is none."""
+        if self._store is None:
+            return ''
+        seen, picture, before, kind = noted.seen, noted.picture, noted.before, ''
+        if picture is None and seen.position is not None:
+            drawn = self._drawn(seen.position, visit)
+            if drawn is not None:
+                (picture, before), kind = drawn, 'sweep-'
+        if picture is None:
+            return ''
+        if before is not None:
+            picture = side_by_side(before, picture)
+        what = f'{kind}{seen.kind}-{seen.subject or seen.place}-{seen.state}'
+        return self._store.keep(picture, what, severity, seen.stamp)
+
+    def end(self, numbers: Iterable[int], stamp: float) -> None:
+        """Take that what made some events is seen no more."""
+        for number in numbers:
+            self.book.end(number, stamp)
+
+    def doubts(self, stamp: float) -> list[Event]:
+        """Return the alerts that wait until the robot has looked again.
+
+        One that nobody could look at again in time is told as it is; so is one whose time is no
+        longer known, for the clock was set back.
+        """
+        for number, until in list(self._doubts.items()):
+            event = self.book.find(number)
+            if event is None or event.state != EventState.OPEN:
+                del self._doubts[number]
+            elif not until - self._verify_seconds <= stamp < until:
+                del self._doubts[number]
+                self._alert(event)
+        return [each for each in map(self.book.find, self._doubts) if each is not None]
+
+    def state(self) -> dict[str, Any]:
+        """Return what must not be forgotten as plain values, for `restore`."""
+        return {
+            'book': self.book.state(),
+            'habits': self._habits.state(),
+            'doubts': {str(number): until for number, until in self._doubts.items()},
+        }
+
+    def restore(self, kept: Mapping[str, Any]) -> None:
+        """Take what `state` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError: It is something else; nothing is changed then.
+        """
+        doubts = {int(each): float(until) for each, until in dict(kept['doubts']).items()}
+        with restoring_all() as parts:
+            parts(self._habits, kept['habits'])
+            parts(self.book, kept['book'])
+        self._doubts = doubts
+
+
+class _Restorable(Protocol):
+    def state(self) -> dict[str, Any]: ...
+
+    def restore(self, kept: Mapping[str, Any], /) -> None: ...
+
+
+@contextlib.contextmanager
+def restoring_all() -> Iterator[Callable[[_Restorable, Mapping[str, Any]], None]]:
+    """Restore several parts, or none: one that does not fit gives back what those before it had."""
+    with contextlib.ExitStack() as undo:
+
+        def restore(part: _Restorable, kept: Mapping[str, Any]) -> None:
+            undo.callback(part.restore, part.state())
+            part.restore(kept)
+
+        yield restore
+        undo.pop_all()
