@@ -36,16 +36,20 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import Grid, Marker
-from indoor_watch.change_monitor import ChangeMonitor
+from indoor_watch import (
+    ChangeMonitor,
+    Event,
+    EventBook,
+    EvidenceStore,
+    Kind,
+    Observation,
+    rule_from,
+)
 from indoor_watch.day_book import DayBook
-from indoor_watch.events import Event, EventBook
-from indoor_watch.evidence import EvidenceStore
 from indoor_watch.hung_markers import CameraView, SeenMarker
-from indoor_watch.observations import Kind, Observation
 from indoor_watch.persons import load_finder
 from indoor_watch.viewpoints import Viewpoints
 from indoor_watch.views import view_changes
-from indoor_watch.watch_rules import rule_from
 from indoor_watch.ways import Ways
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector

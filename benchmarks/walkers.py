@@ -32,10 +32,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import Grid
-from indoor_watch.change_monitor import ChangeMonitor
-from indoor_watch.events import EventBook
-from indoor_watch.observations import Kind, Observation
-from lidar_navigation.exploration.map_building import MapBuilder
+from indoor_watch import ChangeMonitor, EventBook, Kind, Observation
+from lidar_navigation import Localiser, MapBuilder
 from lidar_navigation.geometry import Pose, Scan
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.simulated_place import read_simulated_place

@@ -224,7 +224,7 @@ def check_watch(merged: Configuration, run: Run, nodes: Sequence[node_table.Node
     """
     if run.watch is None or all(node.name != OBSERVER for node in nodes):
         return
-    from indoor_watch.watch_rules import read_watch_file
+    from indoor_watch import read_watch_file
 
     settings = merged.resolve(OBSERVER, full_name(run.namespace, OBSERVER))
     places, doors = (

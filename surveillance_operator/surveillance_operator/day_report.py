@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from floor_plans.facts import counted
+from indoor_watch import Event, EventState
 from indoor_watch.day_book import DayBook, Seen
-from indoor_watch.events import Event, EventState
 from indoor_watch.privacy import PictureError, shareable
 from strict_files.files import FileError, read_file, replace_text
 from surveillance_operator.run_entries import PastIncident, entries_of_run, incidents_of

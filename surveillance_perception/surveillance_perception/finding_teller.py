@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from indoor_watch.events import Event, EventState
+from indoor_watch import Event, EventState
 from strict_files.files import FileError
 from surveillance_runtime.event_log import EventLog, RecordEntry, read_all
 from surveillance_runtime.incidents import Cause, Incidents, SeenThing, Severity
@@ -101,7 +101,7 @@ class FindingTeller:
         """Return what an observer keeps of its book beside the log: what goes on.
 
         Args:
-            book: As `EventBook.to_json` gives it.
+            book: As `EventBook.state` gives it.
         """
         alerted = [int(each.name) for each in self._incidents.open() if each.kind == KIND]
         if self._log is None:

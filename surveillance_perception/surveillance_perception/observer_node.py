@@ -28,23 +28,31 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 from std_msgs.msg import Bool, String
 
 from floor_plans import Grid
+from indoor_watch import (
+    DEFAULT_RULES,
+    MOST_CELLS,
+    ChangeMonitor,
+    Coverage,
+    Event,
+    EventBook,
+    EventState,
+    EvidenceStore,
+    Kind,
+    Level,
+    Observation,
+    read_watch_file,
+    same_map,
+)
 from indoor_watch.answers import answered
 from indoor_watch.backlog import Backlog
-from indoor_watch.change_monitor import ChangeMonitor
 from indoor_watch.day_book import DayBook
-from indoor_watch.events import Event, EventBook, EventState
-from indoor_watch.evidence import EvidenceStore
-from indoor_watch.floor_layers import MOST_CELLS, same_map
 from indoor_watch.hung_markers import CameraView, SeenMarker
 from indoor_watch.lost_sight import DROPPED, LATE, NO_POSE, UNREAD, LostSight
 from indoor_watch.marker_checks import MarkerChecks
-from indoor_watch.observations import Kind, Observation
 from indoor_watch.other_robots import OtherRobots
 from indoor_watch.persons import Person, load_finder
 from indoor_watch.reference_views import ReferenceViews, Viewpoint, same_view
 from indoor_watch.viewpoints import Viewpoints
-from indoor_watch.visit import Coverage
-from indoor_watch.watch_rules import DEFAULT_RULES, Level, read_watch_file
 from indoor_watch.ways import Ways
 from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import Scan, composed, relative

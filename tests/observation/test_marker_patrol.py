@@ -17,13 +17,10 @@ import numpy as np
 import pytest
 
 from floor_plans import Marker
-from indoor_watch.change_monitor import ChangeMonitor
-from indoor_watch.events import Event, EventBook
+from indoor_watch import ChangeMonitor, Event, EventBook, Kind, rule_from
 from indoor_watch.hung_markers import CameraView, SeenMarker
 from indoor_watch.marker_checks import MarkerChecks
-from indoor_watch.observations import Kind
 from indoor_watch.viewpoints import Viewpoints
-from indoor_watch.watch_rules import rule_from
 from lidar_navigation.localisation.place_locator import PlaceRegions
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector

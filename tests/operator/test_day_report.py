@@ -9,11 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from indoor_watch import day_book
+from indoor_watch import EventBook, EventState, EvidenceStore, Kind, Observation, day_book
 from indoor_watch.day_book import DayBook
-from indoor_watch.events import EventBook, EventState
-from indoor_watch.evidence import EvidenceStore
-from indoor_watch.observations import Kind, Observation
 from strict_files.files import FileError
 from surveillance_operator.day_report import write_day
 from surveillance_operator.report import main
@@ -37,13 +34,13 @@ def run(tmp_path: Path) -> Path:
     seen = [door('closed', at(2, 8)), door('closed', at(2, 9)), door('ajar', at(2, 21), shown)]
     for look, each in enumerate(seen):
         days.take(each)
-        book.take(each, severity=3 if each.state == 'ajar' else 0, rule='<D1> shut', look=look)
+        book.take(each, severity=3 if each.state == 'ajar' else 0, rule='<D1> shut', visit=look)
     days.take(door('closed', at(3, 8)))
     false = Observation(Kind.LIGHT, 'off', 'R1', stamp=at(2, 22))
-    event = book.take(false, severity=2, rule='light', look=9)
+    event = book.take(false, severity=2, rule='light', visit=9)
     assert event is not None
     book.answer(event.number, EventState.FALSE)
-    state = {'book': book.to_json(), 'days': days.to_json()}
+    state = {'book': book.state(), 'days': days.state()}
     (tmp_path / 'observer.json').write_text(json.dumps(state))
     entry = {'at': at(2, 21), 'kind': 'event', 'name': '1', 'severity': 'alarm', 'text': 'ajar!'}
     lines = [{**entry, 'seconds': None}, {**entry, 'seconds': 3.0}, {**entry, 'at': at(3, 1)}]
@@ -111,5 +108,5 @@ def test_the_book_of_days_is_bounded_and_comes_back(monkeypatch: pytest.MonkeyPa
         ('other', 2),
     ]
     again = DayBook(datetime.fromtimestamp)
-    again.restore(json.loads(json.dumps(days.to_json())))
-    assert again.to_json() == days.to_json()
+    again.restore(json.loads(json.dumps(days.state())))
+    assert again.state() == days.state()

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from indoor_watch.events import Event, EventBook, EventState
-from indoor_watch.observations import Kind, Observation
+from indoor_watch import Event, EventBook, EventState, Kind, Observation
 from surveillance_perception.finding_teller import PERSON, FindingTeller, findings_of
 from surveillance_runtime.event_log import read
 from surveillance_runtime.incidents import Incidents, IncidentUpdate
@@ -28,11 +27,11 @@ class Told:
         )
         self.book = EventBook(told=self.teller.changed)
 
-    def see_door(self, state: str, stamp: float, look: int = 1) -> Event | None:
+    def see_door(self, state: str, stamp: float, visit: int = 1) -> Event | None:
         """See the door D1; ajar matters."""
-        seen = Observation(Kind.DOOR, state, 'C1', 'D1', stamp=stamp, evidence=f'3_{look}_a.jpg')
+        seen = Observation(Kind.DOOR, state, 'C1', 'D1', stamp=stamp, evidence=f'3_{visit}_a.jpg')
         severity = 3 if state == 'ajar' else 0
-        found = self.book.take(seen, severity=severity, rule='D1 is shut', look=look)
+        found = self.book.take(seen, severity=severity, rule='D1 is shut', visit=visit)
         if found is not None and severity:
             self.teller.alert(found)
         return found
@@ -45,13 +44,13 @@ class Told:
 def test_an_alert_is_an_incident_with_what_was_seen(tmp_path: Path) -> None:
     told = Told(tmp_path)
     told.see_door('ajar', 10.0)
-    told.see_door('ajar', 20.0, look=2)
+    told.see_door('ajar', 20.0, visit=2)
     (begun,) = told.updates
     assert begun.text == '1: door D1 is ajar in C1 (D1 is shut)'
     assert (begun.place, begun.evidence) == ('C1', ('3_1_a.jpg',))
     assert begun.finding is not None
     assert (begun.finding.number, begun.finding.kind, begun.finding.subject) == (1, 'door', 'D1')
-    told.see_door('closed', 30.0, look=3)
+    told.see_door('closed', 30.0, visit=3)
     assert told.phases == ['begin', 'end']
 
 
@@ -61,7 +60,7 @@ def test_who_takes_care_is_noted_and_the_end_comes_when_it_is_over(tmp_path: Pat
     told.book.answer(1, EventState.ACKNOWLEDGED)
     assert told.phases == ['begin', 'update']
     assert told.updates[-1].acknowledged_by == PERSON
-    told.see_door('closed', 30.0, look=2)
+    told.see_door('closed', 30.0, visit=2)
     assert told.phases == ['begin', 'update', 'end']
 
 
@@ -79,7 +78,7 @@ def test_the_log_has_each_change_and_further_looks(tmp_path: Path) -> None:
     assert found is not None
     told.teller.keep([found])
     told.teller.keep([replace(found, looks=2, sightings=5)])
-    told.see_door('closed', 30.0, look=3)
+    told.see_door('closed', 30.0, visit=3)
     entries = read(told.path)
     assert [(e.name, e.text('state'), e.fields['looks']) for e in entries] == [
         ('finding', 'open', 1),
@@ -92,9 +91,9 @@ def test_the_log_has_each_change_and_further_looks(tmp_path: Path) -> None:
 def test_after_a_restart_the_book_is_whole_and_what_goes_on_is_told(tmp_path: Path) -> None:
     told = Told(tmp_path)
     told.see_door('ajar', 10.0)
-    told.see_door('closed', 20.0, look=2)
-    told.see_door('ajar', 30.0, look=3)
-    kept = told.teller.kept(told.book.to_json())
+    told.see_door('closed', 20.0, visit=2)
+    told.see_door('ajar', 30.0, visit=3)
+    kept = told.teller.kept(told.book.state())
     assert [each['number'] for each in kept['events']] == [2], 'what is over is in the log'
     again = Told(tmp_path)
     again.book.restore(again.teller.restored(kept))

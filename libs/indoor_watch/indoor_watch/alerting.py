@@ -16,7 +16,7 @@ from indoor_watch.evidence import EvidenceStore, side_by_side
 from indoor_watch.habits import Habits
 from indoor_watch.observations import Observation
 from indoor_watch.persons import Picture
-from indoor_watch.visit import Noted, Visit
+from indoor_watch.visit import Pictured, Visit
 from indoor_watch.watch_rules import Level, WatchRule, severity_of
 
 Drawn = Callable[[tuple[float, float], Visit], tuple[Picture, Picture | None] | None]
@@ -58,16 +58,16 @@ class Alerting:
         self._habits = Habits()
         self._doubts: dict[int, float] = {}
 
-    def take(self, noted: Iterable[Noted], visit: Visit) -> None:
+    def take(self, noted: Iterable[Pictured], visit: Visit) -> None:
         """Take what was noticed in a visit."""
         for each in noted:
             self._take(each, visit)
 
-    def _take(self, noted: Noted, visit: Visit) -> None:
-        seen = replace(noted.seen, usual=self._habits.usual(noted.seen))
+    def _take(self, pictured: Pictured, visit: Visit) -> None:
+        seen = replace(pictured.seen, usual=self._habits.usual(pictured.seen))
         self._habits.learn(seen, visit.number)
         severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
-        evidence = self._keep(noted, severity, visit) if severity else ''
+        evidence = self._keep(pictured, severity, visit) if severity else ''
         seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=visit.at)
         self._tell(seen)
         words = '' if rule is None else rule.words()
@@ -82,11 +82,11 @@ class Alerting:
             else:
                 self._doubts.setdefault(event.number, seen.stamp + self._verify_seconds)
 
-    def _keep(self, noted: Noted, severity: int, visit: Visit) -> str:
+    def _keep(self, pictured: Pictured, severity: int, visit: Visit) -> str:
         """Keep a picture, and return its file; empty: there is none."""
         if self._store is None:
             return ''
-        seen, picture, before, kind = noted.seen, noted.picture, noted.before, ''
+        seen, picture, before, kind = pictured.seen, pictured.picture, pictured.before, ''
         if picture is None and seen.position is not None:
             drawn = self._drawn(seen.position, visit)
             if drawn is not None:

@@ -122,7 +122,8 @@ class ChangeMonitor:
         """Take the map; what was normal on another one is forgotten."""
         if self._floor.use_map(grid):
             self._doors.use_map()
-            self.visit.floor, self.visit.things, self.visit.shown = None, [], None
+            self.visit.floor, self.visit.things = None, []
+            self.visit.people.shown = None
 
     def arrive(self, place: str, stamp: float) -> None:
         """Take that the robot is in a place; the visit of another one ends."""

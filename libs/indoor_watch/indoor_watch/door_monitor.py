@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from indoor_watch.doors import Segment, read_door
 from indoor_watch.floor import is_leaf
 from indoor_watch.observations import Kind, Observation
-from indoor_watch.visit import SEEN_AGAIN, LidarSweep, Noted, Rooms, Visit
+from indoor_watch.visit import SEEN_AGAIN, LidarSweep, Pictured, Rooms, Visit
 
 DOOR_RANGE = 6.0
 """Doors are read from here on, metres: farther away too few beams meet them."""
@@ -52,7 +52,7 @@ class DoorMonitor:
         for door in self._doors.values():
             door.place = ''
 
-    def take(self, sweep: LidarSweep, visit: Visit) -> list[Noted]:
+    def take(self, sweep: LidarSweep, visit: Visit) -> list[Pictured]:
         """Return what a sweep tells of the doors near it."""
         found = []
         for name, door in self._doors.items():
@@ -63,7 +63,7 @@ class DoorMonitor:
                 readings = visit.readings.setdefault(name, deque(maxlen=READINGS))
                 readings.append((str(reading.state), reading.confidence))
                 seen = self._judged(name, door, visit, sweep.stamp)
-                found += [] if seen is None else [Noted(seen)]
+                found += [] if seen is None else [Pictured(seen)]
         return found
 
     def _judged(self, name: str, door: _Door, visit: Visit, stamp: float) -> Observation | None:

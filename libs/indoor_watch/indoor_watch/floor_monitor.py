@@ -22,7 +22,7 @@ from indoor_watch.evidence import sweep_picture
 from indoor_watch.floor import Change, FloorView, FloorVisit, ObjectChange, changes
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.persons import Picture
-from indoor_watch.visit import LidarSweep, Noted, Visit
+from indoor_watch.visit import LidarSweep, Pictured, Visit
 from indoor_watch.ways import Ways
 
 Points = NDArray[np.float64]
@@ -82,7 +82,7 @@ class FloorMonitor:
         if visit.floor is not None:
             visit.floor.add(sweep.sensor, sweep.ends, sweep.met, sweep.stamp)
 
-    def compare(self, visit: Visit, stamp: float) -> list[Noted]:
+    def compare(self, visit: Visit, stamp: float) -> list[Pictured]:
         """Return what of a visit so far differs from what is normal, in two comparisons."""
         now = self._view(visit)
         if now is None or self.normal is None:
@@ -104,7 +104,7 @@ class FloorMonitor:
         ]
         told += self._blocked(now, again, visit, stamp)
         visit.things = found
-        return [Noted(each) for each in told if visit.is_due(each)]
+        return [Pictured(each) for each in told if visit.is_due(each)]
 
     def _blocked(
         self, now: FloorView, things: Sequence[ObjectChange], visit: Visit, stamp: float

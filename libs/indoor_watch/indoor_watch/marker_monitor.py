@@ -15,7 +15,7 @@ from indoor_watch.observations import Kind, Observation
 from indoor_watch.persons import Picture
 from indoor_watch.view_monitor import SEEN_TWICE
 from indoor_watch.views import Grey
-from indoor_watch.visit import CameraShot, Noted, Visit
+from indoor_watch.visit import CameraShot, Pictured, Visit
 
 Points = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class MarkerMonitor:
 
     def strange(
         self, shot: CameraShot, grey: Grey, visit: Visit, current: Sequence[Event]
-    ) -> list[Noted]:
+    ) -> list[Pictured]:
         """Return the markers that no file knows, once several pictures in a row show them."""
         if not self._known:
             return []
@@ -76,7 +76,7 @@ class MarkerMonitor:
                     Kind.MARKER, 'unknown', visit.place, str(number), visit.at, 0.9, shot.stamp
                 )
                 if visit.is_due(seen):
-                    found.append(Noted(seen, grey))
+                    found.append(Pictured(seen, grey))
         return found
 
     def take(
@@ -85,7 +85,7 @@ class MarkerMonitor:
         visit: Visit,
         current: Sequence[Event],
         before: Picture | None = None,
-    ) -> list[Noted]:
+    ) -> list[Pictured]:
         """Return the markers that hang no longer where they hung, or hang there again.
 
         Args:
@@ -98,7 +98,7 @@ class MarkerMonitor:
         assert camera is not None
         assert shot.markers is not None
         at = float(camera.at[0]), float(camera.at[1])
-        hidden = bool(visit.persons) or self._may_see_robot(at, stamp)
+        hidden = bool(visit.people.count) or self._may_see_robot(at, stamp)
         met = np.zeros((0, 2)) if visit.sweep is None else visit.sweep.points
 
         def is_clear(point: Points) -> bool:
@@ -125,7 +125,7 @@ class MarkerMonitor:
                 stamp,
             )
             if visit.is_due(seen):
-                found.append(Noted(seen, shot.picture, before))
+                found.append(Pictured(seen, shot.picture, before))
         return found
 
 

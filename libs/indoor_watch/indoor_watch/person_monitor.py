@@ -17,7 +17,7 @@ from indoor_watch.motion import WalkFinder
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.person_places import place_of
 from indoor_watch.persons import Person, Picture
-from indoor_watch.visit import CameraShot, Coverage, LidarSweep, Noted, Visit
+from indoor_watch.visit import CameraShot, Coverage, LidarSweep, Pictured, Visit
 
 WALKING = 0.8
 """Confidence that what walks is a person."""
@@ -55,7 +55,7 @@ class PersonMonitor:
         """Take that a visit begins."""
         self._walks.clear()
 
-    def take(self, sweep: LidarSweep, visit: Visit, normal: FloorView | None) -> list[Noted]:
+    def take(self, sweep: LidarSweep, visit: Visit, normal: FloorView | None) -> list[Pictured]:
         """Return who walks; before the sweep is taken into the visit's floor.
 
         Args:
@@ -79,7 +79,7 @@ class PersonMonitor:
 
     def look(
         self, shot: CameraShot, visit: Visit, grid: Grid | None, *, is_lit: bool
-    ) -> list[Noted]:
+    ) -> list[Pictured]:
         """Return who is in a picture."""
         if self._find is None:
             return []
@@ -96,10 +96,10 @@ class PersonMonitor:
         seen = Observation(Kind.PERSON, 'seen', place, '', where, surest.confidence, shot.stamp)
         return _seen_by('camera', seen, visit, _framed(picture, found))
 
-    def leave(self, visit: Visit, coverage: Coverage) -> list[Noted]:
+    def leave(self, visit: Visit, coverage: Coverage) -> list[Pictured]:
         """Return that nobody was there, where a visit that ends saw enough of the floor."""
         is_long = coverage.ended - coverage.began >= LOOKED_SECONDS
-        if not is_long or not coverage.share >= LOOKED or visit.persons:
+        if not is_long or not coverage.share >= LOOKED or visit.people.count:
             return []
         # Who walks about between two pictures is seen by the lidar, and who stands in pictures.
         if coverage.camera_share >= SHOWN:
@@ -108,7 +108,7 @@ class PersonMonitor:
             state, sensor, sure = 'nobody walks', 'lidar', min(UNSURE, coverage.share)
         stamp = coverage.ended
         return [
-            Noted(
+            Pictured(
                 Observation(
                     Kind.PERSON, state, visit.place, confidence=sure, stamp=stamp, sensor=sensor
                 )
@@ -133,7 +133,7 @@ class PersonMonitor:
         if visit.floor is None:
             return []
         now = visit.floor.view()
-        is_pictured = visit.shown is not None or visit.shown_elsewhere
+        is_pictured = visit.people.shown is not None or visit.people.shown_elsewhere
         return [
             event.number
             for event in current
@@ -144,23 +144,23 @@ class PersonMonitor:
 
 def _seen_by(
     sensor: str, seen: Observation, visit: Visit, picture: Picture | None = None
-) -> list[Noted]:
+) -> list[Pictured]:
     """Return a person, with more confidence where the other sensor saw one there just now."""
-    visit.persons += 1
+    visit.people.count += 1
     seen = replace(seen, sensor=sensor)
-    other = visit.person_by.get('camera' if sensor == 'lidar' else 'lidar')
+    other = visit.people.by_sensor.get('camera' if sensor == 'lidar' else 'lidar')
     if other is not None and abs(seen.stamp - other.stamp) > BOTH:
         other = None
     if other is not None and seen.position is None:
         # The camera does not know where: it is who walks there.
         seen = replace(seen, place=other.place, position=other.position)
-    visit.person_by[sensor] = seen
+    visit.people.by_sensor[sensor] = seen
     both = other is not None and other.place == seen.place
     if other is not None and both:
         # They err for different reasons.
         sure = 1.0 - (1.0 - seen.confidence) * (1.0 - other.confidence)
         seen = replace(seen, confidence=sure)
-    return [Noted(seen, picture)] if visit.is_due(seen, 'both' if both else sensor) else []
+    return [Pictured(seen, picture)] if visit.is_due(seen, 'both' if both else sensor) else []
 
 
 def _note_shown(
@@ -168,13 +168,13 @@ def _note_shown(
 ) -> None:
     """Note the floor that a picture shows in which persons were looked for."""
     if camera is None or grid is None:
-        visit.shown_elsewhere = True
+        visit.people.shown_elsewhere = True
         return
-    if visit.shown is None:
-        visit.shown = CameraFloor(grid)
+    if visit.people.shown is None:
+        visit.people.shown = CameraFloor(grid)
     things = None if visit.floor is None else visit.floor.view().occupied
     rows, columns = picture.shape[:2]
-    visit.shown.add(camera, (rows, columns), things)
+    visit.people.shown.add(camera, (rows, columns), things)
 
 
 def _framed(picture: Picture, persons: Sequence[Person]) -> Picture:

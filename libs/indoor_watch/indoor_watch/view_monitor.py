@@ -13,7 +13,7 @@ from indoor_watch.events import Event
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.reference_views import ReferenceViews, Viewpoint
 from indoor_watch.views import Grey, Sight, light_of, sight_of, view_changes
-from indoor_watch.visit import CameraShot, Noted, Visit
+from indoor_watch.visit import CameraShot, Pictured, Visit
 
 MOST_LIT = 500
 """Of so many places it is kept how light they were."""
@@ -29,7 +29,7 @@ class LightMonitor:
         self._sights: Agreement[Sight] = Agreement()
         self._lights: dict[str, Agreement[str]] = {}
 
-    def take(self, grey: Grey, stamp: float, visit: Visit) -> tuple[list[Noted], Sight, str]:
+    def take(self, grey: Grey, stamp: float, visit: Visit) -> tuple[list[Pictured], Sight, str]:
         """Return what is noticed, what kind of view it is, and the light: on, off or not known."""
         sight = sight_of(grey)
         settled = self._sights.take(sight, visit.number, stamp)
@@ -37,12 +37,14 @@ class LightMonitor:
         found = []
         if light and self._is_settled(light, visit, stamp) and light != visit.light:
             visit.light = light
-            found.append(Noted(Observation(Kind.LIGHT, light, visit.place, stamp=stamp), grey))
+            found.append(Pictured(Observation(Kind.LIGHT, light, visit.place, stamp=stamp), grey))
         if settled and sight != visit.sight:
             visit.sight = sight
             if sight != Sight.DARK:
                 state = 'blocked' if sight == Sight.BLOCKED else 'clear'
-                found.append(Noted(Observation(Kind.VIEW, state, visit.place, stamp=stamp), grey))
+                found.append(
+                    Pictured(Observation(Kind.VIEW, state, visit.place, stamp=stamp), grey)
+                )
         visit.saw_clearly |= sight == Sight.CLEAR
         return found, sight, light
 
@@ -74,7 +76,7 @@ class ViewMonitor:
         self.views = views
         self._doors_near = doors_near
 
-    def take(self, shot: CameraShot, visit: Visit, current: Iterable[Event]) -> list[Noted]:
+    def take(self, shot: CameraShot, visit: Visit, current: Iterable[Event]) -> list[Pictured]:
         """Return what a picture that shows something tells of its view.
 
         Args:
@@ -91,10 +93,10 @@ class ViewMonitor:
         known = self.views.at(viewpoint, doors)
         if known is None:
             # Who walks about here is no part of how it looks normally.
-            if not visit.persons:
+            if not visit.people.count:
                 self.views.add(viewpoint, picture, stamp, doors)
             return []
-        if visit.persons:
+        if visit.people.count:
             return []  # it is they who change the view
         differences = view_changes(known.picture, picture)
         things = [each for each in differences or () if not each.may_be_light]
@@ -105,7 +107,7 @@ class ViewMonitor:
         if differences == []:
             if (Kind.VIEW, known.name) in {(each.kind, each.subject) for each in current}:
                 seen = Observation(Kind.VIEW, 'clear', visit.place, known.name, stamp=stamp)
-                return [Noted(seen)]
+                return [Pictured(seen)]
             return []
         for change in (again or differences or [])[:1]:
             # Shadows wander and people leave: one visit alone is no reason to call anybody.
@@ -121,7 +123,7 @@ class ViewMonitor:
                 compared_with=f'{known.stamp:.0f}',
             )
             if visit.is_due(seen):
-                return [Noted(seen, picture, known.picture)]
+                return [Pictured(seen, picture, known.picture)]
         return []
 
     def normal_from(self, viewpoint: Viewpoint | None) -> Any:

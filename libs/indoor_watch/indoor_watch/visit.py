@@ -84,7 +84,7 @@ class CameraShot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Noted:
+class Pictured:
     """An observation with what shows it.
 
     Attributes:
@@ -134,6 +134,23 @@ class Coverage:
 
 
 @dataclass(eq=False)
+class PeopleSeen:
+    """Who was seen in a visit, and where persons were looked for.
+
+    Attributes:
+        count: How often somebody was seen.
+        by_sensor: Whom each sensor saw last.
+        shown: The floor that pictures showed in which persons were looked for; None: there is none.
+        shown_elsewhere: Whether there is one of which nobody knows from where it was taken.
+    """
+
+    count: int = 0
+    by_sensor: dict[str, Observation] = field(default_factory=dict)
+    shown: CameraFloor | None = None
+    shown_elsewhere: bool = False
+
+
+@dataclass(eq=False)
 class Visit:
     """What was in view since the robot came to a place.
 
@@ -149,10 +166,7 @@ class Visit:
         readings: The last ones of each door: state and confidence.
         doors: The states of the doors that were read in this visit.
         pictures: How many were looked at.
-        shown: The floor that pictures showed in which persons were looked for; None: there is none.
-        shown_elsewhere: Whether there is one of which nobody knows from where it was taken.
-        persons: How often somebody was seen.
-        person_by: Whom each sensor saw last.
+        people: Who was seen, and where persons were looked for.
         sight, light: What was told of the view and of the light. They are told anew in each place,
             of which a short visit may give one picture alone.
         held: Pictures whose markers are judged once it is clear what else the visit shows.
@@ -172,10 +186,7 @@ class Visit:
     readings: dict[str, deque[tuple[str, float]]] = field(default_factory=dict)
     doors: dict[str, str] = field(default_factory=dict)
     pictures: int = 0
-    shown: CameraFloor | None = None
-    shown_elsewhere: bool = False
-    persons: int = 0
-    person_by: dict[str, Observation] = field(default_factory=dict)
+    people: PeopleSeen = field(default_factory=PeopleSeen)
     sight: Sight | None = None
     light: str = ''
     held: list[CameraShot] = field(default_factory=list)
@@ -231,8 +242,8 @@ class Visit:
                 seen = int((floor & self.floor.view().seen).sum())
             share = seen / cells
             area = seen * grid.resolution**2
-            if self.shown is not None:
-                shown = int((floor & self.shown.seen).sum()) / cells
-            elif not self.shown_elsewhere:
+            if self.people.shown is not None:
+                shown = int((floor & self.people.shown.seen).sum()) / cells
+            elif not self.people.shown_elsewhere:
                 shown = 0.0
         return Coverage(self.place, self.began, stamp, share, area, self.pictures, shown)

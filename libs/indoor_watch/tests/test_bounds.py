@@ -11,16 +11,15 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
+from indoor_watch import DEFAULT_RULES, EventBook, EventState, Kind, Level, Observation, rule_from
 from indoor_watch.answers import answered
 from indoor_watch.day_book import DayBook, Seen
-from indoor_watch.events import EventBook, EventState
 from indoor_watch.habits import HARMONICS, WEEK, Habits, PeriodicState
 from indoor_watch.hung_markers import CameraView
-from indoor_watch.observations import Kind, Observation
 from indoor_watch.other_robots import OtherRobots
 from indoor_watch.person_places import place_of
 from indoor_watch.persons import Person
-from indoor_watch.watch_rules import DEFAULT_RULES, Level, rule_from, severity_of
+from indoor_watch.watch_rules import severity_of
 from indoor_watch.ways import BlockedWay, Ways
 
 from .marked_walls import camera_pose

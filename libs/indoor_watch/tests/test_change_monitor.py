@@ -15,17 +15,21 @@ import pytest
 import yaml
 
 from floor_plans import Grid
-from indoor_watch.change_monitor import ChangeMonitor
-from indoor_watch.events import EventBook, EventState
-from indoor_watch.evidence import EvidenceStore
+from indoor_watch import (
+    ChangeMonitor,
+    Coverage,
+    EventBook,
+    EventState,
+    EvidenceStore,
+    Kind,
+    Observation,
+    rule_from,
+)
 from indoor_watch.hung_markers import CameraView
 from indoor_watch.motion import WalkFinder
-from indoor_watch.observations import Kind, Observation
 from indoor_watch.other_robots import OtherRobots
 from indoor_watch.persons import Person
 from indoor_watch.reference_views import ReferenceViews
-from indoor_watch.visit import Coverage
-from indoor_watch.watch_rules import rule_from
 from indoor_watch.ways import Ways
 
 from .marked_walls import camera, camera_pose, hang, seen_at, wall

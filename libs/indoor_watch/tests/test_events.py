@@ -6,9 +6,8 @@ import json
 
 import pytest
 
+from indoor_watch import Event, EventBook, EventState, Kind, Observation
 from indoor_watch.answers import answered
-from indoor_watch.events import Event, EventBook, EventState
-from indoor_watch.observations import Kind, Observation
 
 
 def seen(kind=Kind.OBJECT, state='appeared', **more) -> Observation:

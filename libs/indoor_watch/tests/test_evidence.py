@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
-from indoor_watch.evidence import DAY, EvidenceStore, is_sweep, oldest, side_by_side, sweep_picture
+from indoor_watch import EvidenceStore
+from indoor_watch.evidence import DAY, is_sweep, oldest, side_by_side, sweep_picture
 
 PLAIN = np.full((40, 60), 90, np.uint8)
 NOW = 1_700_000_000.25

@@ -7,9 +7,8 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from indoor_watch import Kind, Observation, rule_from
 from indoor_watch.habits import Habits, PeriodicState
-from indoor_watch.observations import Kind, Observation
-from indoor_watch.watch_rules import rule_from
 
 MONDAY = datetime(2026, 3, 2, tzinfo=UTC)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from indoor_watch.observations import Kind
+from indoor_watch import Kind
 
 from .test_change_monitor import HERE, Round, beams, texture
 

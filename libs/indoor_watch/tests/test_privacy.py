@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from skimage import data
 
-from indoor_watch.evidence import DAY, EvidenceStore, is_sweep
+from indoor_watch import EvidenceStore
+from indoor_watch.evidence import DAY, is_sweep
 from indoor_watch.privacy import PictureError, blurred, shareable
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
+from indoor_watch import rule_from
 from indoor_watch.hung_markers import HungSpot
 from indoor_watch.marker_checks import MarkerChecks
 from indoor_watch.viewpoints import ENOUGH, Viewpoints
-from indoor_watch.watch_rules import rule_from
 
 
 def corner() -> Grid:

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
+from indoor_watch import MOST_CELLS, Coverage, Kind, Observation, same_map
 from indoor_watch.agreement import Agreement
 from indoor_watch.floor import FloorView
-from indoor_watch.floor_layers import MOST_CELLS, check, packed, same_map, unpacked
+from indoor_watch.floor_layers import check, packed, unpacked
 from indoor_watch.floor_monitor import FloorMonitor, is_free
 from indoor_watch.marker_monitor import stands_before
-from indoor_watch.observations import Kind, Observation
-from indoor_watch.visit import Coverage, LidarSweep, Visit
+from indoor_watch.visit import LidarSweep, Visit
 
 from .marked_walls import camera
 

@@ -8,8 +8,8 @@ from textwrap import indent
 import pytest
 import yaml
 
-from indoor_watch.observations import Kind, Observation
-from indoor_watch.watch_rules import Level, read_watch_file, rule_from, severity_of
+from indoor_watch import Kind, Level, Observation, read_watch_file, rule_from
+from indoor_watch.watch_rules import severity_of
 from strict_files.files import FileError
 
 TEXT = """
