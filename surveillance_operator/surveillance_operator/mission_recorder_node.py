@@ -112,7 +112,7 @@ class MissionRecorder(PatrolNode):
                 continue
             try:
                 for line in repair(folder):
-                    self.get_logger().info(f'repaired {line}')
+                    self.get_logger().info(f'repair: {line}')
             except OSError as error:
                 self.get_logger().warn(f'{folder}: cannot be repaired: {error.strerror}')
 

@@ -210,3 +210,23 @@ def test_own_types_are_read_with_the_definitions_in_the_file(tmp_path: Path) -> 
         found: Any = reader.deserialize(data, connection.msgtype)
     assert (found.reference_name, found.sequence) == ('map', 7)
     assert found.changes[0].fact.arguments == ['R3']
+
+
+def test_changed_bytes_of_an_earlier_recording_stop_no_later_one(tmp_path: Path) -> None:
+    """One byte in a summary once stopped the recorder of every later mission."""
+    old, new = tmp_path / 'old' / RECORDING, tmp_path / 'new' / RECORDING
+    write(old, ['one', 'two']).close()
+    path, metadata = old / f'{RECORDING}_0.mcap', old / 'metadata.yaml'
+    whole = path.read_bytes()
+    named = 0
+    for where in range(len(whole) - 400, len(whole) - 8, 3):
+        for value in (0xFF, whole[where] ^ 1):
+            changed = bytearray(whole)
+            changed[where] = value
+            path.write_bytes(changed)
+            metadata.unlink(missing_ok=True)
+            named += any('damaged' in line for line in repair(old))
+            prune(tmp_path, 1e9)
+    assert named > 10
+    write(new, ['here']).close()
+    assert read(new) == ['here']

@@ -191,7 +191,8 @@ def repair(folder: Path) -> list[str]:
     """Give files whose writer was killed their index, and the recording its metadata.
 
     Returns:
-        What was repaired, a line each; nothing for a recording that is whole or being written.
+        What was repaired, and what is damaged and left, a line each; nothing for a recording that
+        is whole or being written.
     """
     done: list[str] = []
     for path in segments(folder):
@@ -205,7 +206,7 @@ def repair(folder: Path) -> list[str]:
                 saved = sum(each.count for each in _scanned([path]))
                 done.append(f'{path}: {saved} messages saved')
     if done or not (folder / METADATA).exists():
-        write_metadata(folder, _whole_segments(folder))
+        write_metadata(folder, _whole_segments(folder, done))
     return done
 
 
@@ -320,34 +321,53 @@ def _register(writer: Writer, topic: TopicType) -> int:
     return writer.register_channel(topic.name, ENCODING, schema, metadata)
 
 
-def _whole_segments(folder: Path) -> list[_Segment]:
+def _whole_segments(folder: Path, damaged: list[str] | None = None) -> list[_Segment]:
     """Return what the summaries of a recording's files say, without those that are not whole."""
-    return _scanned(path for path in segments(folder) if _is_whole(path))
+    return _scanned((path for path in segments(folder) if _is_whole(path)), damaged)
 
 
-def _scanned(paths: Iterable[Path]) -> list[_Segment]:
-    """Return what the summaries of files say; a file without messages is deleted."""
+def _scanned(paths: Iterable[Path], damaged: list[str] | None = None) -> list[_Segment]:
+    """Return what the summaries of files say; a file without messages is deleted.
+
+    Args:
+        paths: The files.
+        damaged: Gets a line about each file whose summary cannot be used; it is left as it is.
+    """
     found = []
     for path in paths:
         try:
-            with open(path, 'rb') as file:
-                summary = make_reader(file).get_summary()
+            segment = _scan(path)
         except (McapError, OSError):
             continue
-        if summary is None or summary.statistics is None:
+        except Exception as error:
+            # Of changed bytes the readers make any error, also MemoryError.
+            if damaged is not None:
+                why = f'{type(error).__name__}: {error!s:.80}'
+                damaged.append(f'{path}: its summary is damaged ({why}); it is left as it is')
             continue
-        said = summary.statistics
-        if not said.message_count:
-            path.unlink()
-            continue
-        counts, topics = {}, {}
-        for number, count in said.channel_message_counts.items():
-            channel = summary.channels[number]
-            counts[channel.topic] = count
-            topics[channel.topic] = summary.schemas[channel.schema_id].name, channel.metadata
-        times = said.message_start_time, said.message_end_time
-        found.append(_Segment(path.name, *times, counts, topics))
+        if segment is not None:
+            found.append(segment)
     return found
+
+
+def _scan(path: Path) -> _Segment | None:
+    """Return what the summary of a file says; None: it has none, or no message."""
+    with open(path, 'rb') as file:
+        summary = make_reader(file).get_summary()
+    if summary is None or summary.statistics is None:
+        return None
+    said = summary.statistics
+    if not said.message_count:
+        path.unlink()
+        return None
+    counts, topics = {}, {}
+    for number, count in said.channel_message_counts.items():
+        channel = summary.channels[number]
+        counts[channel.topic] = count
+        topics[channel.topic] = summary.schemas[channel.schema_id].name, channel.metadata
+        yaml.safe_load(channel.metadata.get(QOS, '[]'))  # what the metadata are made of
+    times = said.message_start_time, said.message_end_time
+    return _Segment(path.name, *times, counts, topics)
 
 
 def _is_whole(path: Path) -> bool:
