@@ -137,7 +137,6 @@ def _folders_of(folder: Path) -> Iterator[Entry]:
         yield for_node('armor_server', name, str(folder / part), 'this run')
     for node in (
         'battery_controller',
-        'collision_monitor',
         'motion_controller',
         'ontology_map_builder',
         'simulator',

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import copy
 import gc
 import os
+import shutil
+import tempfile
 import threading
 import time
 import traceback
@@ -35,6 +38,10 @@ hypothesis.settings.load_profile('suite')
 gc.disable()
 _domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
+# What a robot keeps for its next start is a test's own.
+_STATE = Path(tempfile.mkdtemp(prefix='surveillance_state_'))
+atexit.register(shutil.rmtree, _STATE, ignore_errors=True)
+os.environ['XDG_STATE_HOME'] = str(_STATE)
 USER_ENVIRON = dict(os.environ)
 """What a user's shell gives to a command; tests of commands start them with it."""
 # A test machine's neighbours are no part of a test.
@@ -255,6 +262,14 @@ class Graph:
         rclpy.try_shutdown(context=self.context)
         if self.failure is not None:
             raise self.failure
+
+
+@pytest.fixture(autouse=True)
+def _released() -> Iterator[None]:
+    """Let no robot of the next test be stopped by this one."""
+    yield
+    for kept in _STATE.glob('surveillance/stop_*.json'):
+        kept.unlink()
 
 
 @pytest.fixture

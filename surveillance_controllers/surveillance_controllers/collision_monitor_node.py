@@ -8,20 +8,28 @@ robot stands. As a process of its own it also stops a robot whose controller han
 Keep-out zones stand in the way as walls do, and in slow zones the speed is theirs, as long as
 somebody tells where the robot is (`amcl_pose`).
 
-A person stops the robot with the service `stop`: from then on it stands, whoever commands it, over
-restarts of this node too, until a person releases it. The topic `stopped` tells of it.
+A person stops the robot with the service `stop` or the topic `stop_requested`: from then on it
+stands, whoever commands it, until a person releases it by the service. The topic `stopped` tells of
+it. The stop is kept in a file over every restart, whatever starts the robot next; what cannot be
+kept is said.
+
+A command is limited to what the base can do before it is thought about: what one costs does not
+depend on what it says. Whoever else publishes to the base is named in an incident.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -40,6 +48,7 @@ from lidar_navigation.robot_base import robot_deceleration, robot_footprint, rob
 from strict_files.settings import parameter
 from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
 from surveillance_controllers.motion.holding import STOPPED
+from surveillance_interfaces.msg import StopRequest as StopRequestMessage
 from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
 from surveillance_runtime.graph_check import endpoints_of
 from surveillance_runtime.node import PatrolNode
@@ -50,13 +59,24 @@ from surveillance_runtime.profile.check_up import ExpectedTopic, findings
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.sensing.transforms import ScanReader
-from surveillance_runtime.state_file import StateFile
-from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
+from surveillance_runtime.state_topics import (
+    NAMELESS,
+    OwnedTopic,
+    StateSubscription,
+    publishers_of,
+)
+from surveillance_runtime.stop_request import OWN, TOPIC, StopFile, StopRequest, own_file
+from surveillance_runtime.waiting import AwaitedWork
 
 STOP_CAUSE = ('person', 'stop')
 MONITORED = 'cmd_vel_monitored'
 """Topic that the base listens to."""
 BASE_CAUSE = ('robot', 'base')
+SECOND_CAUSE = ('robot', 'second command')
+MOST_TURN = 20.0
+"""No base turns faster, rad/s: the bound of every parameter of a turn."""
+LOOK_PERIOD = 1.0
+"""Seconds of real time between two looks at who commands the base."""
 UNGUARDED_AFTER = 4.0
 """A base that does not listen is told of after this time, seconds."""
 LONGEST_GUESS = 0.5
@@ -84,8 +104,9 @@ class MonitorSettings:
     )
 
     state_file: str = parameter(
-        '',
-        'File that keeps over a restart of the process whether the robot is stopped; empty: none.',
+        OWN,
+        'File that keeps over every restart that the robot is stopped; auto: one of this robot in '
+        "the user's state folder, by ROS domain and namespace; empty: none.",
         read_only=True,
     )
 
@@ -156,8 +177,10 @@ class CollisionMonitor(PatrolNode):
         self._seen: dict[str, Scan] = {}
         self._lidars: dict[str, list[str]] = {}
         self._is_held_back = False
-        self._kept = StateFile(self, self._settings.state_file)
-        self._stopped = self._kept.text('stopped') == 'yes'
+        self._file = StopFile(self._kept_in(self._settings.state_file))
+        self._disk = AwaitedWork(self, 1)
+        self.stopping.subscribe(self._disk.stop)
+        self._stop = self._file.read()
         self._stopped_topic = OwnedTopic(self, Bool, STOPPED)
         self._base = CommandPublisher(
             self,
@@ -179,15 +202,24 @@ class CollisionMonitor(PatrolNode):
             stamp=stamp_of_serialized,
         )
         self.create_service(SetBool, 'stop', self._on_stop)
+        self.create_subscription(StopRequestMessage, TOPIC, self._on_request, 10)
         self._tell_stop()
         self.create_timer(UNGUARDED_AFTER, self._look_for_base)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(LOOK_PERIOD, self._look_for_others, clock=steady)
+
+    def _kept_in(self, name: str) -> Path | None:
+        if name == OWN:
+            domain = self.context.get_domain_id()
+            return own_file(domain, self.get_namespace(), os.environ)
+        return Path(name).expanduser() if name else None
 
     def _on_command(self, message: Twist) -> None:
         speed, turn = message.linear.x, message.angular.z
         if not (math.isfinite(speed) and math.isfinite(turn)):
             self.get_logger().error(f'cmd_vel: {speed} m/s, {turn} rad/s: expected finite numbers')
             speed = turn = 0.0
-        self._wanted = Velocity(speed, turn)
+        self._wanted = self._base.sustained(_within_turn(Velocity(speed, turn)))
         self._base.hear('cmd_vel')
         self._base.command(self._allowed())
 
@@ -233,29 +265,51 @@ class CollisionMonitor(PatrolNode):
                     'and name both in topics.scans of the robot profile'
                 )
 
-    def _on_stop(self, request: Any, response: Any) -> Any:
+    async def _on_request(self, message: StopRequestMessage) -> None:
+        request = StopRequest.heard(message.owner, message.reason)
+        # Who it is may be told after the service has stopped the robot.
+        if self._stop is None or (request.owner and not self._stop.owner):
+            await self._begin_stop(request)
+
+    async def _on_stop(self, request: Any, response: Any) -> Any:
         response.success = True
-        if request.data == self._stopped:
-            response.message = 'the robot is stopped' if self._stopped else 'it is not stopped'
-            return response
-        self._stopped = request.data
-        self._kept.save({'stopped': 'yes' if self._stopped else 'no'})
-        if self._stopped:
-            self._base.command(Velocity())
-        self._tell_stop()
-        response.message = 'the robot is stopped' if self._stopped else 'the robot may move again'
-        self.get_logger().warn(f'{response.message}: a person wants it so')
+        if request.data:
+            problem = await self._begin_stop(self._stop or StopRequest.heard('', ''))
+            response.message = 'the robot is stopped'
+            if problem:
+                response.message += f', but not over a restart of collision_monitor: {problem}'
+        elif self._stop is None:
+            response.message = 'it is not stopped'
+        else:
+            problem = await self._disk.run(self._file.forget)
+            self._stop = None
+            self._tell_stop()
+            response.message = 'the robot may move again'
+            self.get_logger().warn(f'{response.message}: a person wants it so')
+            if problem:
+                response.message += f'; the next start finds it stopped: {problem}'
         return response
 
+    async def _begin_stop(self, request: StopRequest) -> str:
+        """Have the robot stand; return why that cannot be kept over a restart, or ''."""
+        self._stop = request
+        self._base.command(Velocity())
+        self._tell_stop()
+        problem = str(await self._disk.run(partial(self._file.keep, request)))
+        if problem:
+            self.get_logger().error(f'the stop cannot be kept over a restart: {problem}')
+        return problem
+
     def _tell_stop(self) -> None:
-        self._stopped_topic.publish(Bool(data=self._stopped))
-        if self._stopped:
-            self.incidents.begin(STOP_CAUSE, 'the robot is stopped, until a person releases it')
+        self._stopped_topic.publish(Bool(data=self._stop is not None))
+        if self._stop is not None:
+            words = f'the robot is {self._stop.words()}, until a person releases it'
+            self.incidents.begin(STOP_CAUSE, words)
         else:
             self.incidents.end(STOP_CAUSE, 'a person has released the robot')
 
     def _allowed(self) -> Velocity:
-        if self._stopped:
+        if self._stop is not None:
             return Velocity()
         # While nothing was seen the publisher lets nothing through.
         velocity = self._wanted
@@ -282,6 +336,25 @@ class CollisionMonitor(PatrolNode):
         if topic != 'cmd_vel':
             self.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
 
+    def _look_for_others(self) -> None:
+        """Tell who else commands the base: nothing that this node stops holds back such a one."""
+        own = f'{self.get_namespace().rstrip("/")}/{self.get_name()}'
+        others = sorted(
+            {
+                'a nameless node' if NAMELESS in name else name
+                for name in publishers_of(self, self._base.topic).values()
+            }
+            - {own}
+        )
+        if others:
+            self.incidents.begin(
+                SECOND_CAUSE,
+                f'{", ".join(others)} commands the base, too, past the collision monitor, also a '
+                f'robot that is stopped: let it publish on cmd_vel in place of {self._base.topic}',
+            )
+        else:
+            self.incidents.end(SECOND_CAUSE, 'nobody else commands the base')
+
     def _look_for_base(self) -> None:
         """Tell when the base does not listen, or expects another type."""
         kind = self._base.type_name
@@ -302,6 +375,14 @@ class CollisionMonitor(PatrolNode):
                 'instead of from those that are not looked at'
             )
         self.incidents.begin(BASE_CAUSE, lines)
+
+
+def _within_turn(wanted: Velocity) -> Velocity:
+    """Return the velocity on the same arc that turns no faster than any base."""
+    if abs(wanted.turn) <= MOST_TURN:
+        return wanted
+    share = MOST_TURN / abs(wanted.turn)
+    return Velocity(wanted.speed * share, math.copysign(MOST_TURN, wanted.turn))
 
 
 def _nearest(scan: Scan) -> float:

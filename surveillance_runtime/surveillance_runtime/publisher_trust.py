@@ -32,6 +32,7 @@ class PublisherTrust:
         due: When `settle` is to be called, seconds; None: nothing waits.
         rivals: Nodes of other publishers that spoke and are still there.
         node: The node that is believed, as the last look at the graph showed it; empty: not known.
+        publisher: Identity of the publisher that is believed; empty: nobody, or not known.
     """
 
     def __init__(
@@ -47,7 +48,7 @@ class PublisherTrust:
         self._graph = graph
         self._owner = owner
         self._only = only
-        self._publisher = b''
+        self.publisher = b''
         self._heard = float('-inf')
         self._held: dict[bytes, bytes] = {}
 
@@ -59,7 +60,7 @@ class PublisherTrust:
             publisher: Identity of its publisher; empty where the middleware does not tell.
             now: Steady time, seconds.
         """
-        if self.value is not None and publisher == self._publisher:
+        if self.value is not None and publisher == self.publisher:
             self._believe(value, publisher, now)
             return True
         if self.value is None and self._may_begin(publisher):
@@ -92,14 +93,14 @@ class PublisherTrust:
             self._believe(self._held.pop(heir), heir, now)
         self._held = {each: value for each, value in self._held.items() if each in nodes}
         self.rivals = tuple(sorted({nodes[each] or 'a nameless node' for each in self._held}))
-        self.node = nodes.get(self._publisher, '')
+        self.node = nodes.get(self.publisher, '')
         self.due = now + PATIENCE if self._held else None
         return heir is not None
 
     def _heir(self, nodes: Mapping[bytes, str], now: float) -> bytes | None:
         """Return the publisher that takes the place of the one that is believed, if any."""
         newest = [*reversed(self._held)]
-        believed = nodes.get(self._publisher) if self.value is not None else None
+        believed = nodes.get(self.publisher) if self.value is not None else None
         owned = self._only or self._owner in nodes.values()
         if self._owner and believed != self._owner and owned:
             return next((each for each in newest if nodes.get(each) == self._owner), None)
@@ -111,4 +112,4 @@ class PublisherTrust:
         return next((each for each in newest if nodes.get(each) == believed != ''), None)
 
     def _believe(self, value: bytes, publisher: bytes, now: float) -> None:
-        self.value, self._publisher, self._heard = value, publisher, now
+        self.value, self.publisher, self._heard = value, publisher, now

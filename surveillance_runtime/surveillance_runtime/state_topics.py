@@ -211,6 +211,11 @@ class StateSubscription(Generic[M]):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._subscription = node.create_subscription(kind, name, self._on_heard, qos, raw=True)
 
+    @property
+    def publisher(self) -> bytes:
+        """Identity of the publisher that is believed; empty: nobody, or not known."""
+        return self._trust.publisher
+
     def _publishers(self) -> dict[bytes, str]:
         found = publishers_of(self._node, self._subscription.topic_name)
         return {each: '' if NAMELESS in name else name for each, name in found.items()}

@@ -14,9 +14,11 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from state_machines.ros import ServiceCaller
+from state_machines.ros import CallError, ServiceCaller
 from surveillance_controllers.collision_monitor_node import CollisionMonitor
+from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.nav2 import rest_of
+from surveillance_operator.stop_button import StopButton
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic
@@ -27,6 +29,11 @@ from .test_navigation_motion import World, world  # noqa: F401 - a fixture
 def press(graph: Any, stop: bool) -> str:
     caller = ServiceCaller(graph.node, SetBool, 'stop')
     return str(caller.call(SetBool.Request(data=stop), 60.0).message)
+
+
+def open_text(node: Any, cause: tuple[str, ...]) -> str:
+    """Return the text of an open incident of a node; empty where there is none."""
+    return next((str(e.text) for e in node.incidents.updates() if tuple(e.cause) == cause), '')
 
 
 class Joystick:
@@ -66,6 +73,106 @@ def test_a_stop_holds_whoever_commands_and_only_a_person_ends_it(
         assert joystick.speed() == 0.0
     assert press(graph, False) == 'the robot may move again'
     graph.until(lambda: joystick.speed() == 0.5)
+
+
+def test_a_stop_stands_over_every_restart_and_says_by_whom_and_since_when(graph: Any) -> None:
+    monitor = graph.add(CollisionMonitor)
+    button = StopButton(graph.add(PatrolNode, name='mission_page'), owner='the guard')
+    assert button.press(True) == 'the robot is stopped'
+    graph.until(lambda: 'stopped by the guard at ' in open_text(monitor, ('person', 'stop')))
+    graph.remove(monitor)
+    monitor = graph.add(CollisionMonitor)
+    assert 'stopped by the guard at ' in open_text(monitor, ('person', 'stop'))
+    assert press(graph, False) == 'the robot may move again'
+    graph.remove(monitor)
+    assert ('person', 'stop') not in graph.add(CollisionMonitor).incidents.open()
+
+
+def test_a_file_that_cannot_be_read_stops_the_robot(graph: Any, tmp_path: Path) -> None:
+    kept = tmp_path / 'stop.json'
+    kept.write_bytes(b'{"owner": "a", "rea\xff')
+    monitor = graph.add(CollisionMonitor, {'state_file': str(kept)})
+    assert f'{kept} cannot be read' in open_text(monitor, ('person', 'stop'))
+    assert press(graph, False) == 'the robot may move again'
+    assert not kept.exists()
+
+
+def test_a_stop_that_cannot_be_kept_says_so_and_outlives_the_monitor_in_who_drives(
+    graph: Any, tmp_path: Path
+) -> None:
+    (tmp_path / 'file').write_text('')
+    kept = {'state_file': str(tmp_path / 'file' / 'stop.json')}
+    monitor = graph.add(CollisionMonitor, kept)
+    hold = Hold(graph.add(PatrolNode, name='motion_controller'))
+    said = press(graph, True)
+    assert said.startswith('the robot is stopped, but not over a restart of collision_monitor: ')
+    graph.until(lambda: hold.active)
+    graph.remove(monitor)
+    monitor = graph.add(CollisionMonitor, kept)
+    graph.until(lambda: ('person', 'stop') in monitor.incidents.open())
+    assert hold.active
+    assert press(graph, False) == 'the robot may move again'
+    graph.until(lambda: not hold.active)
+
+
+def test_a_stop_while_the_monitor_is_dead_is_obeyed_by_who_drives_and_by_the_next_monitor(
+    graph: Any,
+) -> None:
+    hold = Hold(graph.add(PatrolNode, name='motion_controller'))
+    button = StopButton(graph.add(PatrolNode, name='console'))
+    assert button.press(True).startswith('the robot stands: collision_monitor has not confirmed')
+    assert hold.active
+    monitor = graph.add(CollisionMonitor)
+    graph.until(lambda: ('person', 'stop') in monitor.incidents.open())
+    assert 'by console' in open_text(monitor, ('person', 'stop'))
+    assert hold.active
+    assert button.press(False) == 'the robot may move again'
+    graph.until(lambda: not hold.active)
+
+
+def test_a_stop_that_nobody_hears_is_asked_again(graph: Any) -> None:
+    button = StopButton(graph.add(PatrolNode, name='console'))
+    with pytest.raises(CallError, match='nobody confirms it .* is asked again'):
+        button.press(True)
+    hold = Hold(graph.add(PatrolNode, name='motion_controller'))
+    graph.until(lambda: hold.active)
+
+
+def test_a_robot_without_a_monitor_is_released_by_who_drives_it(graph: Any) -> None:
+    hold = Hold(graph.add(PatrolNode, name='motion_controller'))
+    button = StopButton(graph.add(PatrolNode, name='console'))
+    button.press(True)
+    assert 'whether collision_monitor holds it is not known' in button.press(False)
+    assert not hold.active
+
+
+@pytest.mark.parametrize('speed', [5_000.0, -1e300])
+def test_a_command_beyond_all_bounds_costs_no_more_than_another(graph: Any, speed: float) -> None:
+    graph.add(CollisionMonitor)
+    told = graph.listen(Twist, 'cmd_vel_monitored', 1)
+    commands = graph.node.create_publisher(Twist, 'cmd_vel', 1)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    command = Twist()
+    command.linear.x, command.angular.z = speed, 1e-3 * speed
+
+    def obeyed() -> bool:
+        scans.publish(LaserScan(angle_increment=0.02, range_max=8.0, ranges=[7.0] * 21))
+        commands.publish(command)
+        return any(abs(each.linear.x) > 0.0 or abs(each.angular.z) > 0.0 for each in told)
+
+    graph.until(obeyed)
+    assert all(abs(each.linear.x) <= 1.0 and abs(each.angular.z) <= 20.0 for each in told)
+    assert press(graph, True) == 'the robot is stopped'
+
+
+def test_whoever_else_commands_the_base_is_named(graph: Any) -> None:
+    monitor = graph.add(CollisionMonitor)
+    stranger = graph.add(PatrolNode, name='stranger')
+    publisher = stranger.create_publisher(Twist, 'cmd_vel_monitored', 1)
+    cause = ('robot', 'second command')
+    graph.until(lambda: '/stranger commands the base, too' in open_text(monitor, cause))
+    stranger.destroy_publisher(publisher)
+    graph.until(lambda: cause not in monitor.incidents.open())
 
 
 @pytest.mark.parametrize('topic', ['stopped', 'paused'])

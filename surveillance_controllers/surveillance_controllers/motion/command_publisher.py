@@ -147,12 +147,12 @@ class CommandPublisher:
     def command(self, velocity: Velocity) -> None:
         """Publish a command as far as the age of what was heard allows it."""
         with self._lock:
-            self.wanted = self._sustained(velocity)
+            self.wanted = self.sustained(velocity)
             now = self._now()
             self._publish(now)
             self._watch(now)
 
-    def _sustained(self, velocity: Velocity) -> Velocity:
+    def sustained(self, velocity: Velocity) -> Velocity:
         """Return the velocity, or less where the robot would brake before each message."""
         top, speed = self._age.top_speed, abs(velocity.speed)
         if speed <= top + 1e-6:

@@ -1,0 +1,123 @@
+"""A person's wish that the robot stands: who has it, since when, and the file that keeps it.
+
+The wish stands until a person releases the robot. It is kept in the user's state folder, by the
+ROS domain and the robot's namespace, and not with a run: another command, another place or another
+option starts a robot that is stopped, too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from strict_files.files import FileError, in_one_line, read_json
+from strict_files.regular_files import replace_file
+
+TOPIC = 'stop_requested'
+"""Where a wish is told: by page, console, view, or a hardware button."""
+OWN = 'auto'
+"""In place of a file's name: the robot's own, in the user's state folder."""
+LONGEST_TEXT = 200
+"""Letters that are kept of a name or a reason: anybody may send one."""
+_LARGEST = 10_000
+
+
+@dataclass(frozen=True)
+class StopRequest:
+    """A wish that the robot stands.
+
+    Attributes:
+        owner: Who has it; empty: nobody said.
+        reason: Why; empty: nobody said.
+        since: When it came, seconds of UNIX time.
+    """
+
+    owner: str
+    reason: str
+    since: float
+
+    @classmethod
+    def heard(cls, owner: str, reason: str) -> StopRequest:
+        """Return the wish that somebody has just told, its words in one line."""
+        return cls(_in_one_line(owner), _in_one_line(reason), time.time())
+
+    def words(self) -> str:
+        """Return who stopped the robot, when, and why."""
+        at = time.strftime('%H:%M on %Y-%m-%d', time.localtime(self.since))
+        by = f' by {self.owner}' if self.owner else ''
+        return f'stopped{by} at {at}' + (f' ({self.reason})' if self.reason else '')
+
+
+def _in_one_line(text: str) -> str:
+    """Return a stranger's text without line breaks and control characters, at most 200 letters."""
+    return ''.join(each if each.isprintable() else ' ' for each in text[:LONGEST_TEXT]).strip()
+
+
+def own_file(domain: int, namespace: str, environ: Mapping[str, str]) -> Path:
+    """Return the file in which a robot's stop is kept on this machine.
+
+    Args:
+        domain: The ROS domain.
+        namespace: Of the robot, `/` for none.
+        environ: The environment: `XDG_STATE_HOME` names the state folder, else ~/.local/state.
+    """
+    state = environ.get('XDG_STATE_HOME') or os.path.expanduser('~/.local/state')
+    robot = re.sub(r'\W', '_', namespace.strip('/'))
+    name = f'stop_{domain}_{robot}.json' if robot else f'stop_{domain}.json'
+    return Path(state, 'surveillance', name)
+
+
+class StopFile:
+    """Keeps a wish over the end of every process; each call waits for the disk.
+
+    Args:
+        path: The file; None: nothing is kept.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+
+    def read(self) -> StopRequest | None:
+        """Return the wish that is kept; None where there is none.
+
+        A file that cannot be read stops the robot as well: that it was released is not known.
+        """
+        if self.path is None:
+            return None
+        try:
+            found = read_json(self.path, _LARGEST)
+            if found is None:
+                return None
+            owner, reason = str(found['owner']), str(found['reason'])
+            return StopRequest(_in_one_line(owner), _in_one_line(reason), float(found['since']))
+        except (FileError, KeyError, TypeError, ValueError) as error:
+            return StopRequest('', f'{self.path} cannot be read: {error}', time.time())
+
+    def keep(self, request: StopRequest) -> str:
+        """Write the wish to the disk; return why it cannot be kept, or ''."""
+        if self.path is None:
+            return 'no file is given for it'
+        content = {'owner': request.owner, 'reason': request.reason, 'since': request.since}
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(self.path, json.dumps(content).encode() + b'\n', durable=True)
+        except OSError as error:
+            return in_one_line(error)
+        return ''
+
+    def forget(self) -> str:
+        """Remove the wish; return why it is still kept, or ''."""
+        if self.path is None:
+            return ''
+        try:
+            with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+                self.path.unlink()
+        except OSError as error:
+            return in_one_line(error)
+        return ''
