@@ -132,7 +132,7 @@ def test_a_stop_while_the_monitor_is_dead_is_obeyed_by_who_drives_and_by_the_nex
 
 def test_a_stop_that_nobody_hears_is_asked_again(graph: Any) -> None:
     button = StopButton(graph.add(PatrolNode, name='console'))
-    with pytest.raises(CallError, match='nobody confirms it .* is asked again'):
+    with pytest.raises(CallError, match=r'nobody confirms it .* is asked again'):
         button.press(True)
     hold = Hold(graph.add(PatrolNode, name='motion_controller'))
     graph.until(lambda: hold.active)
