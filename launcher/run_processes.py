@@ -134,7 +134,11 @@ def programs_of(
         programs.append(program(members))
     programs += [
         # What the launcher tells of comes on the alarm's input.
-        replace(program([node]), takes_input=node.name == node_table.ALARM)
+        replace(
+            program([node]),
+            takes_input=node.name == node_table.ALARM,
+            can_be_missed=node.name == PAGE,
+        )
         for node in observers
         if node.name not in (RECORDER, MARKERS)
     ]

@@ -70,6 +70,7 @@ class ManagedProcess:
         leads: whether it uses the others, and so is stopped before them.
         ends_run: whether all others are stopped when it has ended, by itself or not: what it
             knows is the run's result, and one that were started again would begin anew.
+        can_be_missed: whether the others go on without it where it cannot start at present.
         memory: bytes of resident memory beyond which it is ended and started again; 0: any.
     """
 
@@ -79,6 +80,7 @@ class ManagedProcess:
     takes_input: bool = False
     leads: bool = False
     ends_run: bool = False
+    can_be_missed: bool = False
     memory: int = 0
 
 
@@ -344,6 +346,9 @@ class Supervisor:
             self._log.say(f'{name} has ended by itself')
             if child.program.ends_run:
                 self.stop()
+            return
+        if code == EXIT_NOT_NOW and child.starts == 1 and child.program.can_be_missed:
+            self._log.error(f'{name} cannot start: the run goes on without it')
             return
         if code in (EXIT_CANNOT_START, EXIT_NOT_NOW) and child.starts == 1:
             self._log.error(f'{name} cannot start with this configuration: stopping')

@@ -234,6 +234,9 @@ def stop_if_unusable(event: ProcessExited, _context: LaunchContext) -> list[Shut
     """End the launch when a node says that its configuration does not let it start."""
     if event.returncode not in (EXIT_CANNOT_START, EXIT_NOT_NOW):
         return None
+    # A page whose port is taken is missed, and the mission goes on.
+    if event.returncode == EXIT_NOT_NOW and PAGE in event.process_name:
+        return None
     return [Shutdown(reason=f'{event.process_name} cannot start with this configuration')]
 
 

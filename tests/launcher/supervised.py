@@ -24,6 +24,7 @@ for argument in sys.argv[1:]:
             takes_input=True,
             leads=name.startswith('lead'),
             ends_run=name.startswith('job'),
+            can_be_missed=name.startswith('page'),
             memory=int(os.environ.get('MEMORY', '0')),
         )
     )

@@ -7,6 +7,7 @@ that the originals give to their arguments.
 from __future__ import annotations
 
 import dataclasses
+import os
 import runpy
 import sys
 import types
@@ -229,6 +230,8 @@ def test_a_node_that_cannot_start_ends_the_launch_and_another_one_does_not(start
     refused = types.SimpleNamespace(returncode=2, process_name='armor_server-1')
     assert on_exit(refused, {}) == ['armor_server-1 cannot start with this configuration']
     assert on_exit(types.SimpleNamespace(returncode=-9, process_name='armor_server-1'), {}) is None
+    taken = types.SimpleNamespace(returncode=os.EX_TEMPFAIL, process_name='mission_page-9')
+    assert on_exit(taken, {}) is None, 'the mission goes on without a page'
 
 
 def test_it_is_installed_with_the_parameter_files():

@@ -210,6 +210,16 @@ def test_a_child_that_cannot_be_configured_ends_the_launch(start, code):
     assert 'starting it again' not in output
 
 
+def test_a_page_whose_port_is_taken_costs_a_line_and_not_the_mission(start):
+    taken = f'print("Address already in use"); raise SystemExit({os.EX_TEMPFAIL})'
+    launch = start(DRIVER, f'one={WAIT}', f'page={taken}')
+    launch.until('page cannot start: the run goes on without it')
+    assert launch.end(signal.SIGTERM)[0] == 0
+    output = '\n'.join(launch.lines)
+    assert 'Address already in use' in output
+    assert 'starting it again' not in output
+
+
 def test_a_child_that_says_it_has_finished_is_left_alone(start):
     launch = start(DRIVER, f'one={FINISHED}; print("bye", end="")')
     assert launch.end()[0] == 0
