@@ -10,7 +10,7 @@ from pathlib import Path
 from launcher.environment import interpreter
 from launcher.fleet_launch import RobotProcesses
 from launcher.log_merge import ROS_FORMAT
-from launcher.run import MARKERS, RECORDER, Run
+from launcher.run import MARKERS, PAGE, RECORDER, Run
 from launcher.supervisor import ManagedProcess
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes

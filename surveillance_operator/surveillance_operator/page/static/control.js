@@ -44,7 +44,7 @@ export class Control {
     if (!may) return;
     for (const button of document.querySelectorAll('[data-machine]')) {
       button.addEventListener('click', async () => {
-        $('machine-answer').textContent = (await act('machine', {word: button.dataset.machine})).text;
+        $(button.dataset.answer ?? 'machine-answer').textContent = (await act('machine', {word: button.dataset.machine})).text;
       });
     }
     for (const [id, on] of [['stop', true], ['release', false]]) {
@@ -52,6 +52,13 @@ export class Control {
         $('stop-answer').textContent = (await act('stop', {on})).text;
       });
     }
+    // The key stops, wherever one is on the page; not while one types.
+    document.addEventListener('keydown', (event) => {
+      if (event.key.toLowerCase() !== 's' || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+      if (event.target.closest?.('input, select, textarea')) return;
+      const button = event.shiftKey && !$('stop-all').hidden ? $('stop-all') : $('stop');
+      if (!button.hidden) button.click();
+    });
     this.place = select('place', 'Place');
     this.door = select('door', 'Door');
     this.room = select('name', 'Room');

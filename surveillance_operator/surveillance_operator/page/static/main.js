@@ -38,6 +38,16 @@ export function now() {
   return clock.now + Math.min(passed, 5) * clock.rate;
 }
 
+// Alerts of the observer that nobody has answered; they stand in the head and the title of each robot's page.
+let alerts = 0;
+
+function showAlerts(open, words) {
+  alerts = open;
+  $('alerts').hidden = !open;
+  $('alerts').firstElementChild.textContent = `${open} open ${open === 1 ? 'alert' : 'alerts'}: ${words}`;
+  header();
+}
+
 function set(id, text) {
   const element = $(id);
   if (element.textContent !== text) element.textContent = text;
@@ -49,9 +59,12 @@ function header() {
   const name = shown.robot ? `${shown.robot} · ` : '';
   const begins = fleet.isOne || shown.robot ? `${name}a mission begins` : 'what all robots share';
   set('title', status ? `${name}${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? begins : 'no mission yet');
-  document.title = status ? `${name}${status.place || '?'} · ${status.machine}` : 'Mission';
+  document.title = (alerts ? `(${alerts}) ` : '') + (status ? `${name}${status.place || '?'} · ${status.machine}` : 'Mission');
   set('stop', shown.robot ? `STOP ${shown.robot}` : 'STOP');
-  $('stop').hidden = !fleet.isOne && !shown.robot;
+  const none = !fleet.isOne && !shown.robot;
+  $('stop').hidden = none;
+  $('pause').hidden = none || !mission?.running || Boolean(state.active?.paused);
+  $('go').hidden = none || !mission?.running || !state.active?.paused;
   set('control-h', shown.robot ? `Control of ${shown.robot}` : 'Control');
   const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.waiting_for_help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
   set('state', words.filter(Boolean).join(' · '));
@@ -95,7 +108,7 @@ const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'pla
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'brief', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],
-  header: [['status', 'mission', 'robots'], header],
+  header: [['status', 'mission', 'active', 'robots'], header],
   figures: [['figures', 'battery'], figures],
   why: [['decision', 'places', 'status'], () => why.show()],
   lists: [['events', 'markers', 'transitions'], lists],
@@ -198,4 +211,4 @@ present();
 connect();
 setInterval(() => { listen(); map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);
-if (root.dataset.watch === '1') new Watching(may, now);
+if (root.dataset.watch === '1') new Watching(may, now, showAlerts);

@@ -13,8 +13,10 @@ const words = (event) => `${event.kind}${event.subject ? ' ' + event.subject : '
 const moment = (at, now) => `${now - at > DAY ? new Date(1000 * at).toLocaleDateString('en-GB') + ' ' : ''}${timeOfDay(at)}`;
 
 export class Watching {
-  constructor(may, now) {
+  // Told how many alerts are open, and the latest of them in words.
+  constructor(may, now, onAlerts) {
     this.may = may;
+    this.onAlerts = onAlerts;
     this.now = now;
     this.chosen = null;
     this.told = null;
@@ -35,10 +37,13 @@ export class Watching {
     if (!found.ok) return;
     $('watching-section').hidden = $('watching-link').hidden = !found.watching;
     const text = JSON.stringify(found);
-    if (text === this.text) return;
+    // Its ends go with the time, which is not known yet when the page is opened.
+    if (text === this.text) { this.timeline(this.events); return; }
     this.text = text;
     this.events = found.events;
     this.notify();
+    const open = this.events.filter((each) => each.state === 'open' && each.severity >= ALERT).sort((a, b) => b.last - a.last);
+    this.onAlerts(open.length, open.length ? `${words(open[0])}, since ${timeOfDay(open[0].began)}` : '');
     this.show(found);
   }
 
