@@ -2,6 +2,7 @@
 
 Hears `incidents` and `/parameter_events`. What the launcher has to tell, which is no node, comes on
 the standard input, one line each (`IncidentUpdate.to_line`), and is published as the launcher's.
+The end of what a node that was started again tells of no more is published, too.
 """
 
 from __future__ import annotations
@@ -74,13 +75,15 @@ class Alarm(PatrolNode):
         self._settings = self.declare_fields(AlarmSettings())
         folder = Path(self._settings.folder) if self._settings.folder else None
         self._sinks = self._open_sinks(folder)
-        self._keeper = IncidentKeeper(self._on_call, folder, self._mission_time)
+        self._of_others = IncidentPublisher(self)
+        self._keeper = IncidentKeeper(
+            self._on_call, folder, self._mission_time, lost=self._of_others.publish
+        )
         self._inbox = queue.Queue[Callable[[], object]](MOST_WAITING)
         self._allowed = Allowance(PARAMETERS_PER_SECOND, PARAMETERS_AT_ONCE)
         # Whose publisher told of what goes on, and what that node is called in the graph.
         self._tellers: dict[str, bytes] = {}
         self._names: dict[bytes, str] = {}
-        self._of_launcher = IncidentPublisher(self)
         hear_incidents(self, lambda told, who: self._take(partial(self._hear, told, who)))
         self.create_subscription(
             ParameterEvent, '/parameter_events', self._on_parameters, qos_profile_parameter_events
@@ -220,7 +223,7 @@ class Alarm(PatrolNode):
             self.get_logger().warn(f'the launcher: {error}')
             return
         self._take(partial(self._keeper.hear, told))
-        self._of_launcher.publish(told)
+        self._of_others.publish(told)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -9,10 +9,15 @@ subscribed to by each of them, and read from recordings of other programs.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from surveillance_operator.mission_state import MissionState
+from surveillance_runtime.incidents import Severity
+
+LONGEST = 80
+"""Characters of a sentence that is a figure."""
 
 
 class FigureTopic(NamedTuple):
@@ -98,6 +103,24 @@ def _doors(state: MissionState) -> str:
     return f'{" ".join(closed)} closed, {len(doors) - len(closed)} open'
 
 
+def _incidents(state: MissionState) -> str:
+    """Return how many incidents go on, and the worst of them in words."""
+    found = state.health.incidents.values()
+    if not found:
+        return ''
+    worst = next((each for each in found if each.severity is Severity.ALARM), next(iter(found)))
+    others = f', and {len(found) - 1} more' if len(found) > 1 else ''
+    by = f' ({worst.acknowledged_by} takes care)' if worst.acknowledged_by else ''
+    return f'{textwrap.shorten(worst.text, LONGEST, placeholder=" ...")}{by}{others}'
+
+
+def _calls_somebody(state: MissionState) -> bool:
+    return any(
+        each.severity is Severity.ALARM and not each.acknowledged_by
+        for each in state.health.incidents.values()
+    )
+
+
 def _volts(message: Any) -> float | None:
     return float(message.voltage) if math.isfinite(message.voltage) else None
 
@@ -125,5 +148,6 @@ FIGURES: tuple[Figure, ...] = (
         lambda state: not all((state.place.doors or {}).values()),
         awaited=('door_states', 'the simulator or the doors publish it'),
     ),
+    Figure('incidents', 'incidents', _incidents, _calls_somebody),
 )
 """Every figure, in the order in which they are shown."""

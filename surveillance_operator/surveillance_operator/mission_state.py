@@ -18,6 +18,7 @@ from floor_plans import Grid, Zone
 from floor_plans.shapes import Segment
 from patrol_policy.promises import Promise
 from patrol_policy.world import Decision
+from surveillance_runtime.incidents import Cause, IncidentUpdate
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))
 TRAIL_STEP = 0.1
@@ -285,6 +286,7 @@ class HealthView:
         restarts: How often a node was seen to start again.
         reports: What the nodes report, by name.
         silent: Why nothing comes on a topic, where that is known.
+        incidents: What goes wrong, as its owner told it last, by owner and cause.
     """
 
     nodes: Mapping[str, frozenset[str]] = field(default_factory=dict)
@@ -292,6 +294,7 @@ class HealthView:
     restarts: Mapping[str, int] = field(default_factory=dict)
     reports: Mapping[str, NodeReport] = field(default_factory=dict)
     silent: Mapping[str, str] = field(default_factory=dict)
+    incidents: Mapping[tuple[str, Cause], IncidentUpdate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

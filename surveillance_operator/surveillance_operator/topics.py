@@ -35,6 +35,7 @@ from surveillance_interfaces.msg import (
     FsmStatus,
     FsmStructure,
     FsmTransition,
+    Incident,
     MarkerDetectionArray,
     MissionStatus,
     RobotPlace,
@@ -55,6 +56,8 @@ from surveillance_operator.mission_state import (
 )
 from surveillance_runtime.conversions import map_from, points_from_cloud, pose_from, seconds_of
 from surveillance_runtime.fleet_messages import FLEET_TOPIC
+from surveillance_runtime.incident_topic import INCIDENTS_QOS, update_from
+from surveillance_runtime.incident_topic import TOPIC as INCIDENTS_TOPIC
 from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.robot_arm import ARM
@@ -62,6 +65,7 @@ from surveillance_runtime.robot_arm import ARM
 MOST_CELLS = 16_000_000
 MOST_POINTS = 20_000
 MOST_NAMES = 10_000
+MOST_INCIDENTS = 200
 MOST_BEAMS = 120
 """Of a scan with more beams every n-th is shown."""
 URGENT_MARK = ' URGENT'
@@ -275,6 +279,22 @@ def _on_fleet_robot(message: FleetRobot, old: MissionState) -> Fields:
 
 def _in_fleet(message: FleetRobot) -> frozenset[str]:
     return frozenset((message.robot,))
+
+
+def _whose_incident(message: Incident) -> frozenset[str] | None:
+    return frozenset({message.robot}) if message.robot else None
+
+
+def _on_incident(message: Incident, old: MissionState) -> Fields:
+    told = update_from(message)
+    if told.robot not in ('', old.namespace.rpartition('/')[2]):
+        return {}
+    open_ones = dict(old.health.incidents)
+    open_ones.pop((told.owner, told.cause), None)
+    if not told.over:
+        open_ones[told.owner, told.cause] = told
+    # Of what a stranger may make up, the newest.
+    return {'incidents': dict(list(open_ones.items())[-MOST_INCIDENTS:])}
 
 
 def _whose_parameters(message: ParameterEvent) -> frozenset[str]:
@@ -546,6 +566,7 @@ TOPICS: tuple[Topic, ...] = (
     *(Topic(f'{name}/announcement', String, _on_request(name)) for name in CONTROLLERS),
     Topic(FLEET_TOPIC, FleetRobot, _on_fleet_robot, _MANY, whose=_in_fleet),
     *(topic_of(each) for each in FIGURES if each.heard is not None),
+    Topic(INCIDENTS_TOPIC, Incident, _on_incident, INCIDENTS_QOS, whose=_whose_incident),
     Topic('/diagnostics', DiagnosticArray, _on_diagnostics, _MANY, period=1.0, whose=_who_reports),
     Topic('/parameter_events', ParameterEvent, _on_parameters, _MANY, whose=_whose_parameters),
 )

@@ -302,12 +302,14 @@ class Incident:
         began: When it began, seconds on the book's clock.
         ended: When it ended; None: it goes on.
         calls: How often somebody was called.
+        is_lost: Whether it ended since its owner, started again, has not told of it any more.
     """
 
     told: IncidentUpdate
     began: float
     ended: float | None = None
     calls: int = 0
+    is_lost: bool = False
 
 
 @dataclass
@@ -316,6 +318,7 @@ class _Open:
     next_call: float = 0.0
     ends_at: float | None = None
     ending: str = ''
+    is_lost: bool = False
 
 
 class IncidentCall(NamedTuple):
@@ -364,6 +367,7 @@ class IncidentBook:
         if told.over:
             if known is not None and known.ends_at is None:
                 known.ends_at, known.ending = now + SETTLED, told.text
+                known.is_lost = False
             return
         if known is None:
             if len(self._open) >= MOST_OPEN:
@@ -378,7 +382,7 @@ class IncidentBook:
             if worse:
                 told = replace(told, severity=Severity.ALARM)
             known.incident = replace(known.incident, told=told)
-            known.ends_at = None
+            known.ends_at, known.is_lost = None, False
         self.advance(now)
 
     def restore(
@@ -398,13 +402,15 @@ class IncidentBook:
         incident = Incident(told, began, calls=calls)
         next_call = called + _again(calls) if calls else now
         ending = 'it was not told again after a restart'
-        self._open[told.owner, told.cause] = _Open(incident, next_call, now + TOLD_AGAIN, ending)
+        ends_at = now + TOLD_AGAIN
+        self._open[told.owner, told.cause] = _Open(incident, next_call, ends_at, ending, True)
 
     def restarted(self, owner: str, now: float) -> None:
         """Take that a node was started again: what it told of ends, unless it tells of it again."""
         for (teller, _), each in self._open.items():
             if teller == owner and each.ends_at is None:
                 each.ends_at, each.ending = now + TOLD_AGAIN, f'{owner} was started again'
+                each.is_lost = True
 
     def advance(self, now: float) -> float | None:
         """Call whom it is time to call; return when to look again, None: after news."""
@@ -448,7 +454,7 @@ class IncidentBook:
         self._call(IncidentCall(incident.told.text + since, incident, incident.calls, over=False))
 
     def _finish(self, each: _Open, now: float) -> None:
-        incident = replace(each.incident, ended=now)
+        incident = replace(each.incident, ended=now, is_lost=each.is_lost)
         self._note(incident)
         self.past = [*self.past[-KEPT:], incident]
         if incident.calls:

@@ -20,6 +20,8 @@ from surveillance_operator.page_state import PatchMaker
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter
 from surveillance_operator.topics import TOPICS, read_message, topic_of
 from surveillance_operator.watch.view import MissionView
+from surveillance_runtime.incident_topic import message_from
+from surveillance_runtime.incidents import Cause, IncidentPhase, IncidentUpdate, Severity
 from tests.operator.prompt import Prompt
 
 HUMIDITY = Figure(
@@ -94,3 +96,28 @@ def test_figures_follow_the_state() -> None:
     assert known['doors'].words == 'D1 closed, 2 open'
     assert figures_line(state) == 'battery 15 % (low) · doors D1 closed, 2 open'
     assert figures_line(MissionState()) == ''
+
+
+def test_incidents_are_a_figure_of_all_views_until_they_are_over() -> None:
+    (topic,) = (each for each in TOPICS if each.name == 'incidents')
+    state = MissionState(namespace='anna')
+
+    def told(phase: IncidentPhase, robot: str = 'anna', **more: Any) -> MissionState:
+        update = IncidentUpdate(
+            *(phase, Cause('door', 'D1'), Severity.ALARM, 'D1 is closed'),
+            robot=robot,
+            node='robot_behavior',
+            **more,
+        )
+        return read_message(state, topic, message_from(update, 1.0))
+
+    state = told(IncidentPhase.BEGIN, robot='bert')
+    assert 'incidents' not in figures_line(state), 'it is of another robot'
+    state = told(IncidentPhase.BEGIN)
+    assert figures_line(state) == 'incidents D1 is closed'
+    (shown,) = (each for each in figures_of(state) if each.figure.name == 'incidents')
+    assert shown.is_bad
+    state = told(IncidentPhase.UPDATE, acknowledged_by='a person')
+    assert figures_line(state) == 'incidents D1 is closed (a person takes care)'
+    state = told(IncidentPhase.END)
+    assert figures_line(state) == ''

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ class IncidentKeeper:
         mission_time: Returns the seconds on the mission's clock.
         steady: Returns the seconds since the machine was started.
         wall: Returns the seconds since 1970.
+        lost: Called with each incident that is over since its owner tells of it no more.
     """
 
     def __init__(
@@ -52,7 +54,9 @@ class IncidentKeeper:
         mission_time: Callable[[], float | None] = lambda: None,
         steady: Callable[[], float] = steady_now,
         wall: Callable[[], float] = time.time,
+        lost: Callable[[IncidentUpdate], object] = lambda _told: None,
     ) -> None:
+        self._lost = lost
         self._call, self._folder, self._mission_time = call, folder, mission_time
         self._steady, self._wall = steady, wall
         self._logs: dict[Path, EventLog] = {}
@@ -103,6 +107,8 @@ class IncidentKeeper:
         else:
             lasted = round(incident.ended - incident.began, 1)
             self._write_incident(incident, 'end', seconds=lasted)
+            if incident.is_lost:
+                self._lost(replace(incident.told, phase=IncidentPhase.END))
 
     def _write_incident(self, incident: Incident, phase: str, **more: object) -> None:
         told = incident.told
