@@ -101,7 +101,7 @@ class Knowledge:
 
 
 def nav2(graph: Any, recorder: Any = None, flat: Any = None, **more: Any) -> nav2_motion.Nav2Motion:
-    settings: Any = SimpleNamespace(peer_timeout=1.0)
+    settings: Any = SimpleNamespace(peer_timeout=60.0)
     knowledge: Any = Knowledge({} if flat is None else flat.POSITIONS)
     doors = {} if flat is None else {'doors.D': [4.05, 1.5, np.pi / 2, 1.0]}
     taken: Any = recorder or Recorder()
@@ -250,7 +250,7 @@ def test_a_path_that_leads_nowhere_is_a_turn_by_the_shorter_way(
 
 def docked(graph: Any, station: tuple[float, float, float]) -> nav2_motion.DockingMotion:
     stations = {'C2': Station((90.0, 0.0, 0.0)), 'E': Station(station)}
-    settings = MotionSettings(stations=stations, dock_type='charger', peer_timeout=1.0)
+    settings = MotionSettings(stations=stations, dock_type='charger', peer_timeout=60.0)
     return nav2_motion.DockingMotion(graph.node, nav2(graph), settings)
 
 

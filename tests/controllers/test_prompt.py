@@ -133,7 +133,7 @@ def test_one_console_addresses_every_controller(graph: Any, operator: Any, capfd
     graph.add(BatteryController, silent)
     graph.add(PlannerController, silent)
     levels = graph.listen(UInt8, 'battery_level', STATE_QOS)
-    node = graph.add(ConsoleNode, {'peer_timeout': 2.0}, console_source=operator.source)
+    node = graph.add(ConsoleNode, {'peer_timeout': 5.0}, console_source=operator.source)
     operator.type('battery set 42')
     graph.until(lambda: levels and levels[-1].data == 42)
     operator.type('plan set []')

@@ -20,7 +20,7 @@ def test_the_console_commands_no_other_robot_than_the_one_that_was_named(
     anna = Robot(graph, 'anna')
     receiver, sender = os.pipe()
     with os.fdopen(receiver) as source:
-        given = {'robot': 'ana', 'peer_timeout': 3.0}
+        given = {'robot': 'ana', 'peer_timeout': 6.0}
         console = graph.add(ConsoleNode, given, console_source=source)
 
         def is_heard() -> bool:

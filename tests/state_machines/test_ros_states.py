@@ -233,7 +233,7 @@ def test_an_executor_that_stops_in_the_middle_aborts(graph):
     spinner = ExecutorThread(context)
     spinner.executor.add_node(node)
     spinner.start()
-    state = action(node, server_wait_timeout=1.5, preempt_timeout=SHORT)
+    state = action(node, server_wait_timeout=4.0, preempt_timeout=SHORT)
     server = next(n for n in graph._nodes if isinstance(n, ScriptedActionServer))
     # The state's own wait is short, since it is as well how long it trusts its executor.
     graph.until(state._caller.is_ready)
