@@ -15,10 +15,10 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import TextIO
 
-# What the nodes are told to print, so that severity and origin can be read back from a line.
-ROS_FORMAT = '[{severity}] [{name}] {message}'
-_ROS_LINE = re.compile(r'\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[([\w./~-]+)\] ?(.*)')
-_NODE_LINE = re.compile(r'\[(\w+)\] (.*)')
+_FIELD = '\x1f'
+"""Stands between the fields of a line that a node logs: no text of a node holds it."""
+ROS_FORMAT = _FIELD.join(('', '{severity}', '{name}', '{message}'))
+"""What the nodes are told to print: how severe it is, who says it, what."""
 _ESCAPES = re.compile(r'\x1b\[[0-9;?]*[ -/]*[@-~]')
 _SEVERITY_COLOURS = {'WARN': '33', 'ERROR': '31', 'FATAL': '1;31', 'DEBUG': '2'}
 _NODE_COLOURS = ('36', '32', '35', '34', '96', '92', '95', '94')
@@ -74,9 +74,11 @@ class MergedLog:
     def line(self, process: str, raw: str) -> None:
         """Print a line that `process` printed."""
         # A progress bar redraws its line: only what it ended with belongs into a log.
-        text = bounded(raw.rstrip().rsplit('\r', 1)[-1])
-        if match := _ROS_LINE.match(_ESCAPES.sub('', text)):
-            severity, origin, message = match.groups()
+        text = raw.rstrip('\r\n\t ').rsplit('\r', 1)[-1]
+        if text.startswith(_FIELD) and text.count(_FIELD) >= 3:
+            _, severity, origin, message = text.split(_FIELD, 3)
+            severity, origin, message = map(bounded, (severity, origin, message))
+            message = _ESCAPES.sub('', message)
             name = origin.rsplit('.', 1)[-1]
             if (of_robot := '/'.join(origin.split('.')[-2:])) in self._names:
                 name = of_robot
@@ -84,8 +86,12 @@ class MergedLog:
                 self._write(name, severity, message)
             else:
                 self._write(process, severity, f'{origin}: {message}')
-        elif (match := _NODE_LINE.match(text)) and match[1] in self._names:
-            self._write(match[1], '', match[2])
+            return
+        text = bounded(text)
+        # A prompt prints past the logger, with its node's name in front.
+        name, sign, message = text.removeprefix('[').partition('] ')
+        if sign and text.startswith('[') and name in self._names:
+            self._write(name, '', message)
         elif text:
             self._write(process, '', text)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from launcher.log_merge import LONGEST_LINE, LogFile, MergedLog, bounded
+from launcher.log_merge import LONGEST_LINE, ROS_FORMAT, LogFile, MergedLog, bounded
 
 
 @pytest.fixture
@@ -19,11 +19,16 @@ def body(text):
     return [re.sub(r'^\d\d:\d\d:\d\d\.\d{3} ', '', line) for line in text.splitlines()]
 
 
+def logged(severity, name, message):
+    """Return a line as a node prints it that the launcher started."""
+    return ROS_FORMAT.format(severity=severity, name=name, message=message)
+
+
 def test_a_ros_line_shows_its_node_and_severity(stream):
     log = MergedLog(stream, ['armor_server', 'robot_behavior'])
-    log.line('armor_server', '[INFO] [armor_server] ready')
-    log.line('armor_server', '[WARN] [robot1.armor_server] slow')
-    log.line('armor_server', '[ERROR] [rmw_fastrtps] no network')
+    log.line('armor_server', logged('INFO', 'armor_server', 'ready'))
+    log.line('armor_server', logged('WARN', 'robot1.armor_server', 'slow'))
+    log.line('armor_server', logged('ERROR', 'rmw_fastrtps', 'no network'))
     log.say('started')
     assert body(stream.getvalue()) == [
         'armor_server   | ready',
@@ -35,7 +40,7 @@ def test_a_ros_line_shows_its_node_and_severity(stream):
 
 def test_a_process_of_several_nodes_is_shown_by_node(stream):
     log = MergedLog(stream, ['one', 'two', 'composed'])
-    log.line('composed', '[INFO] [two] hello')
+    log.line('composed', logged('INFO', 'two', 'hello'))
     assert body(stream.getvalue()) == ['two      | hello']
 
 
@@ -54,7 +59,7 @@ def test_on_a_terminal_a_long_line_is_broken_at_words(monkeypatch, tmp_path, col
     stream.isatty = lambda: True
     log = MergedLog(stream, ['one'], path=tmp_path / 'log')
     text = 'E is the nearest charging place, seven seconds away from here'
-    log.line('one', f'[INFO] [one] {text}')
+    log.line('one', logged('INFO', 'one', text))
     log.close()
     lines = stream.getvalue().splitlines()
     assert len(lines) == shown
@@ -107,7 +112,7 @@ def test_a_redrawn_line_shows_what_it_ended_with(stream):
 
 def test_colours_are_for_the_stream_and_not_for_the_file(stream, tmp_path):
     log = MergedLog(stream, ['one'], colour=True, path=tmp_path / 'log')
-    log.line('one', '[ERROR] [one] \x1b[1mbroken\x1b[0m')
+    log.line('one', logged('ERROR', 'one', '\x1b[1mbroken\x1b[0m'))
     log.plain('the end')
     log.close()
     assert '\x1b[31m' in stream.getvalue()
