@@ -242,10 +242,12 @@ def _idleness_of_all(
         for event in events:
             if event.name == 'visit':
                 times.setdefault(event.text('place'), []).append(event.time)
+    removed = _removed_at(records.values())
     rows = []
     for place in sorted(times):
         visits = sorted(times[place])
-        longest = max(after - before for before, after in pairwise([begin, *visits, end]))
+        until = max([removed.get(place, end), *visits])
+        longest = max(after - before for before, after in pairwise([begin, *visits, until]))
         late = threshold is not None and longest > threshold
         by = ', '.join(
             f'{robot} {summary.visits[place]}'
@@ -253,9 +255,10 @@ def _idleness_of_all(
             if summary.visits[place]
         )
         rows.append(
-            f'<tr><td>{escape(place)}</td><td class="n">{len(visits)}</td><td>{escape(by)}</td>'
+            f'<tr><td>{_name(place, removed)}</td><td class="n">{len(visits)}</td>'
+            f'<td>{escape(by)}</td>'
             f'<td class="n{" late" if late else ""}">{longest:.0f} s{" !" if late else ""}</td>'
-            f'<td class="w">{_strip(visits, threshold, begin, end)}</td></tr>'
+            f'<td class="w">{_strip(visits, threshold, begin, end, until)}</td></tr>'
         )
     return (
         '<table><thead><tr><th>place</th><th class="n">visits</th><th>by</th>'
@@ -316,7 +319,10 @@ def _page(folder: Path, happened: RunEntries, drawn: str, bound: float | None) -
     is_whole = events[0].name != 'snapshot'
     start = begin if is_whole else end - summary.seconds
     body = [f'<h1>Mission {escape(folder.name)}</h1>']
-    body += [f'<p>{escape(line)}</p>' for line in _overview(summary, threshold, bound)]
+    body += [
+        f'<p>{escape(line)}</p>'
+        for line in _overview(summary, _removed_at([events]), threshold, bound)
+    ]
     if told := happened.problem():
         body.append(f'<p class="late">{escape(told)}</p>')
     if not is_whole:
@@ -408,11 +414,15 @@ def _incidents(entries: Iterable[RecordEntry]) -> str:
 
 
 def _overview(
-    summary: mission_log.Summary, threshold: float | None, bound: float | None
+    summary: mission_log.Summary,
+    removed: Mapping[str, float],
+    threshold: float | None,
+    bound: float | None,
 ) -> list[str]:
     """Return the mission in a few sentences."""
-    visited = sum(1 for times in summary.visits.values() if times)
-    did = f'{in_words(summary)} · {visited} of {len(summary.visits)} places visited'
+    there = [times for place, times in summary.visits.items() if place not in removed]
+    visited = sum(1 for times in there if times)
+    did = f'{in_words(summary)} · {visited} of {len(there)} places visited'
     limits = [f'Threshold {threshold:g} s.' if threshold else 'The threshold was not recorded.']
     if bound:
         limits.append(f'No patrol at this pace keeps every place below {bound:.0f} s.')
@@ -426,16 +436,18 @@ def _idleness(
     start: float,
     end: float,
 ) -> str:
+    removed = _removed_at([events])
     rows = []
     for place in sorted(summary.visits):
         times = [e.time for e in events if e.name == 'visit' and e.text('place') == place]
+        until = max([removed.get(place, end), *times])
         longest = summary.unvisited.get(place, 0.0)
         late = threshold is not None and longest > threshold
         mark = ' !' if late else ''
         rows.append(
-            f'<tr><td>{escape(place)}</td><td class="n">{summary.visits[place]}</td>'
+            f'<tr><td>{_name(place, removed)}</td><td class="n">{summary.visits[place]}</td>'
             f'<td class="n{" late" if late else ""}">{longest:.0f} s{mark}</td>'
-            f'<td class="w">{_strip(times, threshold, start, end)}</td></tr>'
+            f'<td class="w">{_strip(times, threshold, start, end, until)}</td></tr>'
         )
     return (
         '<table><thead><tr><th>place</th><th class="n">visits</th>'
@@ -444,10 +456,41 @@ def _idleness(
     )
 
 
-def _strip(times: Iterable[float], threshold: float | None, start: float, end: float) -> str:
-    """Return how long a place had not been visited, over the mission, as a small SVG."""
+def _removed_at(records: Iterable[Sequence[RecordEntry]]) -> dict[str, float]:
+    """Return when each place was removed that was there and is there no more: it waits for nobody.
+
+    Args:
+        records: What happened to each robot.
+    """
+    known: set[str] = set()
+    removed: dict[str, float] = {}
+    maps = (each for events in records for each in events if each.name in ('start', 'map'))
+    for event in sorted(maps, key=lambda event: event.time):
+        places = {*event.names('places'), *([event.text('place')] if event.name == 'start' else ())}
+        removed |= dict.fromkeys(known - places - removed.keys(), event.time)
+        for place in places & removed.keys():
+            del removed[place]
+        known |= places
+    return removed
+
+
+def _name(place: str, removed: Mapping[str, float]) -> str:
+    return escape(f'{place} (removed)' if place in removed else place)
+
+
+def _strip(
+    times: Iterable[float], threshold: float | None, start: float, end: float, until: float
+) -> str:
+    """Return how long a place had not been visited, over the mission, as a small SVG.
+
+    Args:
+        times: Of its visits.
+        threshold: Of the mission, seconds.
+        start, end: Of the mission.
+        until: When the place was removed; the end where it was not.
+    """
     span = max(end - start, 1.0)
-    gaps = [start, *sorted(times), end]
+    gaps = [start, *sorted(times), until]
     top = max(threshold or 0.0, *(b - a for a, b in pairwise(gaps))) or 1.0
     points = []
     for before, at in pairwise(gaps):

@@ -14,11 +14,13 @@ from rclpy.serialization import serialize_message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import fleet_subscriber, node_graph_watch
 from surveillance_operator.recording import bag as recorded_bag
 from surveillance_operator.recording.schemas import definition
 from tests.operator.browser import Viewer
 from tests.operator.foreign_bag import START, said
+from tests.operator.test_timeline import record
 
 
 class Disk:
@@ -88,3 +90,30 @@ def _look_often(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have nodes and robots that come and go be seen at once."""
     for module in (node_graph_watch, fleet_subscriber):
         monkeypatch.setattr(module, 'LOOK_PERIOD', 0.05)
+
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    folder = tmp_path / 'runs' / '20260101-000000'
+    folder.mkdir(parents=True)
+    record(folder / 'timeline.jsonl')
+    (folder / 'place.yaml').write_bytes((ROOT / 'config/seven_rooms.yaml').read_bytes())
+    with MissionRecord(folder / 'events.jsonl') as mission:
+        mission.write(
+            'start',
+            0.0,
+            machine='surveillance',
+            place='E',
+            places=['R1', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'],
+        )
+        mission.write(
+            'decision', 1.0, place='C1', rule='CORRIDOR', reason='<b>C1</b> waits longest'
+        )
+        mission.write('visit', 11.0, place='C1', distance=5.4)
+        mission.write('failure', 12.0, what='MOVE', reason='no way')
+        mission.write('recharge', 20.0, place='E', seconds=5.0)
+        mission.write('end', 60.0)
+    return folder

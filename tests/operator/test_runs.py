@@ -8,7 +8,7 @@ import pytest
 
 from strict_files.files import FileError
 from surveillance_operator.recording.reading import files_of
-from surveillance_operator.recording.runs import find_recordings
+from surveillance_operator.recording.runs import find_recordings, find_run
 
 
 def test_a_bag_and_its_file_are_found_by_name(bag: Path, tmp_path: Path) -> None:
@@ -30,3 +30,16 @@ def test_what_holds_no_recording_is_named_and_what_is_expected(name: str, tmp_pa
     (tmp_path / 'recording_0.mcap').touch()
     (tmp_path / 'recording_1.mcap').touch()
     assert [each.name for each in files_of(tmp_path)] == ['recording_0.mcap', 'recording_1.mcap']
+
+
+def test_a_run_is_found_by_what_it_holds_and_not_by_a_wrong_name(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert find_run(str(run / 'events.jsonl'), run.parent) == run
+    monkeypatch.chdir(run)  # the folder of a run itself
+    with pytest.raises(FileError, match='nowhere'):
+        find_run('nowhere', run.parent)
+    (other := run.with_name('20260102-000000')).mkdir()
+    (other / 'events.jsonl').touch()
+    with pytest.raises(FileError, match=f'e.g. {run.name}, or last'):
+        find_run('20260101-00000', run.parent)
