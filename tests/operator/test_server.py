@@ -117,7 +117,7 @@ def test_an_action_needs_token_and_origin(page: Page) -> None:
         ('/act/refused', '{}', 422),
         ('/act/door', '{}', 422),
         ('/act/door', '{"doors": "D1"}', 422),
-        ('/act/unknown', '{}', 403),
+        ('/act/unknown', '{}', 404),
     ],
 )
 def test_what_cannot_be_done_is_said(page: Page, path: str, body: str, status: int) -> None:

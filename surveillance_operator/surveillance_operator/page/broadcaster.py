@@ -27,6 +27,8 @@ from surveillance_operator.page_state import (
 
 LEAST_PERIOD = 0.015
 """Seconds between two messages to one viewer."""
+PER_VIEWER = 0.002
+"""The same for each viewer that there is, seconds: many are told more seldom."""
 HEARTBEAT = 2.0
 """Seconds after which a viewer is told the time at least."""
 OF_ALL = frozenset({'events', 'replay'})
@@ -58,6 +60,7 @@ class Broadcaster:
         self._robots: dict[str, _Robot] = {}
         self._of_all: Texts = {}
         self._version = 0
+        self._messages: dict[tuple[str, int, int, float], str] = {}
         self.closed = False
 
     @property
@@ -130,10 +133,10 @@ class Broadcaster:
                     if seen < 0:
                         self._waiting[changed] = chosen
                         self._bring(chosen, anew=True)
-                    message = self._message(chosen, seen)
+                    message = self._shared_message(chosen, seen)
                     seen = self._version
                 yield f'data: {message}\n\n'
-                await asyncio.sleep(LEAST_PERIOD)
+                await asyncio.sleep(max(LEAST_PERIOD, PER_VIEWER * len(self._waiting)))
                 try:
                     await asyncio.wait_for(changed.wait(), HEARTBEAT)
                 except TimeoutError:
@@ -147,6 +150,19 @@ class Broadcaster:
         if asked is not None and asked in self._robots:
             return asked
         return min(self._robots, key=lambda name: (not name, name), default='')
+
+    def _shared_message(self, chosen: str, seen: int) -> str:
+        """Return the message, which is made once for all viewers that know the same."""
+        now = self._robots[chosen].now if chosen in self._robots else 0.0
+        key = chosen, seen, self._version, now
+        if key not in self._messages:
+            self._messages = {
+                each: text
+                for each, text in self._messages.items()
+                if each[2] == self._version and each[3] == now
+            }
+            self._messages[key] = self._message(chosen, seen)
+        return self._messages[key]
 
     def _message(self, chosen: str, seen: int) -> str:
         """Return what a viewer is told that knows the versions up to one."""

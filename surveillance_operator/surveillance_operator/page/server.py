@@ -18,11 +18,13 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import uvicorn
+from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -39,7 +41,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from state_machines.exceptions import CallError
 from strict_files.regular_files import parse_json
+from strict_files.suggestions import nearest
 from surveillance_operator.page.broadcaster import Broadcaster
+from surveillance_operator.page.connections import (
+    SEND_BUFFER,
+    BoundedConnection,
+    most_connections,
+)
 from surveillance_runtime import parameter_checks
 
 STATIC = Path(__file__).with_name('static')
@@ -52,6 +60,10 @@ HEADERS = {
     'Referrer-Policy': 'no-referrer',
     'Cache-Control': 'no-store',
 }
+
+STOPPING = ('stop', 'fleet')
+"""Actions that have threads of their own: whatever else keeps the others busy, a robot stops."""
+
 
 Action = Callable[..., Any]
 """Takes a request's fields by name; returns what came of it, or raises `ValueError` or `CallError`
@@ -129,8 +141,11 @@ class Page:
         ]
         app = _Guard(Starlette(routes=routes), self._refusal, report)
         _report_for_uvicorn(report)
+        connection = type('Connection', (BoundedConnection,), {'most': most_connections()})
         config = uvicorn.Config(
             app,
+            http=connection,
+            ws='none',
             log_config=None,
             access_log=False,
             lifespan='off',
@@ -139,6 +154,7 @@ class Page:
         )
         self._server = uvicorn.Server(config)
         self._thread: threading.Thread | None = None
+        self._stop_threads: CapacityLimiter | None = None
 
     @property
     def address(self) -> str:
@@ -246,10 +262,16 @@ class Page:
         return await _answered(question, dict(request.query_params))
 
     async def _act(self, request: Request) -> Response:
-        action = self._actions.get(request.path_params['name'])
-        if action is None:
+        name = request.path_params['name']
+        if not self._actions:
             return JSONResponse(
                 {'ok': False, 'text': 'control is off: start with --web-control'}, 403
+            )
+        action = self._actions.get(name)
+        if action is None:
+            expected = nearest(name[:80], self._actions)
+            return JSONResponse(
+                {'ok': False, 'text': f'no action {name[:80]!r}, expected {expected}'}, 404
             )
         origin = request.headers.get('origin', '')
         own = self._origin or f'http://{request.headers.get("host", "")}'
@@ -262,18 +284,25 @@ class Page:
             text = 'refused: open the address with the token that the mission printed'
             return JSONResponse({'ok': False, 'text': text}, 403)
         body = bytearray()
-        longest = self._longest.get(request.path_params['name'], LONGEST_BODY)
+        longest = self._longest.get(name, LONGEST_BODY)
         async for chunk in request.stream():
             body += chunk
             if len(body) > longest:
-                return JSONResponse({'ok': False, 'text': 'the request is too long'}, 413)
+                # What still comes is not read: the connection ends.
+                return JSONResponse(
+                    {'ok': False, 'text': 'the request is too long'}, 413, {'Connection': 'close'}
+                )
         try:
             given = parse_json(bytes(body) or b'{}')
         except ValueError:
             given = None
         if not isinstance(given, dict):
             return JSONResponse({'ok': False, 'text': 'expected a JSON object'}, 400)
-        return await _answered(action, given)
+        if name not in STOPPING:
+            return await _answered(action, given)
+        if self._stop_threads is None:  # it belongs to the loop that serves
+            self._stop_threads = CapacityLimiter(8)
+        return await _answered(action, given, self._stop_threads)
 
 
 class _Guard:
@@ -292,7 +321,6 @@ class _Guard:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope['type'] != 'http':
             return
-
         begun = False
 
         async def send_with_headers(message: Any) -> None:
@@ -304,7 +332,10 @@ class _Guard:
             await send(message)
 
         try:
-            refused = self._refusal(Request(scope))
+            request = Request(scope)
+            refused = self._refusal(request)
+            if refused is None and 'upgrade' in request.headers:
+                refused = 426, 'no WebSocket here: what changes is told at /events'
             app = self._app if refused is None else PlainTextResponse(refused[1], refused[0])
             await app(scope, receive, send_with_headers)
         except Exception as error:  # one request costs one line, whatever it was
@@ -313,10 +344,12 @@ class _Guard:
                 await PlainTextResponse('failed', 500)(scope, receive, send_with_headers)
 
 
-async def _answered(call: Action, fields: Mapping[str, Any]) -> Response:
+async def _answered(
+    call: Action, fields: Mapping[str, Any], threads: CapacityLimiter | None = None
+) -> Response:
     try:
         inspect.signature(call).bind(**fields)
-        result = await run_in_threadpool(call, **fields)
+        result = await to_thread.run_sync(partial(call, **fields), limiter=threads)
     except (ValueError, TypeError, CallError) as error:
         return JSONResponse({'ok': False, 'text': str(error)}, 422)
     return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
@@ -355,6 +388,7 @@ def _bound(host: str, port: int) -> socket.socket:
         )[0]
         bound = socket.socket(family, kind, protocol)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         bound.bind(address)
         bound.listen(64)
     except (OSError, OverflowError) as error:

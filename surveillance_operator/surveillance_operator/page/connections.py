@@ -1,0 +1,95 @@
+"""The page's connections: bounded in number, in the time of a request, and in how slowly one reads.
+
+Anybody who reaches the port may open connections, send half a request, or never read what comes.
+None of that may keep a person from the Stop: a connection without a whole request ends after a
+while, a viewer that reads nothing is cut off, and where there are too many, the least useful one
+makes room for a new one. Viewers that are cut off come back by themselves (`EventSource`).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import resource
+from typing import Any
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+HEADER_TIME = 5.0
+"""Seconds within which the head of a request has to be there."""
+BODY_SILENCE = 10.0
+"""Seconds after which a body that does not go on is given up."""
+UNREAD_TIME = 10.0
+"""Seconds after which a viewer that takes nothing of what waits for it is cut off."""
+SEND_BUFFER = 65_536
+"""Bytes that the kernel keeps for a viewer: one that does not read is noticed after these."""
+MOST = 512
+"""Connections at one time, where the process may have twice as many files open."""
+
+
+def most_connections() -> int:
+    """Return how many connections there may be: half of the files that the process may open."""
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return MOST if soft == resource.RLIM_INFINITY else max(8, min(MOST, soft // 2))
+
+
+class BoundedConnection(H11Protocol):
+    """One connection of the page."""
+
+    most = MOST
+    """How many there may be at a time."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Take a new connection; another one goes where there are too many."""
+        super().connection_made(transport)
+        self._since = self.loop.time()
+        self._deadline: asyncio.TimerHandle | None = None
+        self._unread: asyncio.TimerHandle | None = None
+        self._end_in(HEADER_TIME)
+        if len(self.connections) > self.most:
+            self._make_room()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what came; a request that is whole may take its time to be answered."""
+        super().data_received(data)
+        if self.is_whole:
+            self._end_in(None)
+        elif self.cycle is not None:
+            self._end_in(BODY_SILENCE)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the last request has come as a whole."""
+        return self.cycle is not None and not self.cycle.more_body
+
+    def pause_writing(self) -> None:
+        """Begin to wait for a viewer that reads more slowly than it is told."""
+        super().pause_writing()
+        if self._unread is None:
+            self._unread = self.loop.call_later(UNREAD_TIME, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Go on with a viewer that has read."""
+        super().resume_writing()
+        if self._unread is not None:
+            self._unread.cancel()
+            self._unread = None
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._end_in(None)
+        super().connection_lost(exc)
+        if self._unread is not None:
+            self._unread.cancel()
+
+    def _end_in(self, seconds: float | None) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        wait = None if seconds is None else self.loop.call_later(seconds, self.transport.abort)
+        self._deadline = wait
+
+    def _make_room(self) -> None:
+        """End the oldest connection that asked for nothing yet, else the oldest of all."""
+        others: list[Any] = [each for each in self.connections if each is not self]
+        useless = [each for each in others if not each.is_whole]
+        oldest = min(useless or others, key=lambda each: each._since)
+        oldest.transport.abort()
