@@ -13,9 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Bool, Int32
 
-from marker_detection.annotation import annotated
-from marker_detection.camera_model import CameraModel
-from marker_detection.marker_stream import MarkerStream, StreamSettings
+from marker_detection import CameraModel, MarkerStream, StreamSettings, annotated
 from strict_files.settings import parameter
 from surveillance_interfaces.msg import MarkerDetectionArray
 from surveillance_perception.conversions import (

@@ -23,9 +23,9 @@ from std_msgs.msg import Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from indoor_watch.hung_markers import SeenMarker
+from marker_detection import MarkerPose
 from marker_detection.camera_model import DISTORTION_MODELS, Array, CameraModel
 from marker_detection.fusion import FusedPosition, FusedPositions, is_measured
-from marker_detection.pose import MarkerPose
 from marker_detection.rotations import rotation_of
 from surveillance_interfaces.action import ScanSurroundings
 from surveillance_interfaces.msg import MarkerDetection, MarkerDetectionArray, RoomConnection
@@ -38,7 +38,7 @@ from surveillance_perception.stream.image_files import ImageArray, decode_image
 from surveillance_runtime.conversions import PlanarPose, pose_from
 
 if TYPE_CHECKING:  # the detector behind it takes 0.2 s to import: one node needs it
-    from marker_detection.marker_stream import Sighting
+    from marker_detection import Sighting
 
 
 def image_from_ros(message: Image, max_pixels: int) -> ImageArray:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import cv2
 
-from marker_detection.annotation import annotated
-from marker_detection.detector import DetectorSettings, MarkerDetector
+from marker_detection import DetectorSettings, MarkerDetector, annotated
 from strict_files.files import in_one_line
 from strict_files.regular_files import replace_file
 from surveillance_perception.stream.image_files import read_image

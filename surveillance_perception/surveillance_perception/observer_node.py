@@ -58,7 +58,7 @@ from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import Scan, composed, relative
 from lidar_navigation.localisation.odometry import OdometryBuffer
 from lidar_navigation.robot_base import robot_radius
-from marker_detection.camera_model import CameraModel
+from marker_detection import CameraModel
 from state_machines import Interrupt
 from state_machines.ros import CallError, ServiceCaller
 from state_machines.ros.waiting import reported

@@ -10,7 +10,7 @@ from typing import Any
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from marker_detection.camera_model import CameraModel
+from marker_detection import CameraModel
 from state_machines.ros import ClockWait
 from strict_files.settings import parameter
 from surveillance_perception.conversions import camera_to_ros, image_to_ros

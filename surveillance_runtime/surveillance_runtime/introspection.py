@@ -12,10 +12,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 import state_machines as fsm
-from state_machines.container import Container
+from state_machines import Container
 from state_machines.exceptions import CallError
 from state_machines.export import to_ascii
-from state_machines.ros.calls import ServiceCaller
+from state_machines.ros import ServiceCaller
 from state_machines.ros.waiting import seconds
 from state_machines.structure import Structure, state_at
 from state_machines.transitions import Transition, TransitionFeed

@@ -8,8 +8,7 @@ from typing import Any
 
 from std_msgs.msg import Header
 
-from state_machines.container import Container
-from state_machines.exceptions import InvalidStateError
+from state_machines import Container, InvalidStateError
 from state_machines.export import to_mermaid
 from state_machines.structure import Structure
 from state_machines.transitions import Transition, presentable

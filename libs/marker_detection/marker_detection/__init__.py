@@ -4,7 +4,11 @@
     for found in detector.detect(image):  # BGR or grey, bytes
         print(found.marker_id, found.corners)
 
-Each name is imported when it is first used; OpenCV only then.
+Each name is imported when it is first used; OpenCV only then. See it run:
+``python -m marker_detection.demo``.
+
+Public modules: `camera_model` (lenses), `fusion` (positions from many views), `rotations`
+(quaternions), `testing.marker_scene` and `testing.image_effects` (pictures with known truth).
 """
 
 from __future__ import annotations

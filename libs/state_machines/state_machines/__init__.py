@@ -1,8 +1,13 @@
 """A state machine engine with SMACH's interface and without ROS.
 
-``import state_machines as smach`` runs machines written for SMACH. The rest is in modules of
-their own: `verify`, `export`, `transitions`, `checkpoint`, `testing`, and `state_machines.ros` for
-ROS 2.
+``import state_machines as smach`` runs machines written for SMACH. Begin with `StateMachine`, or
+see it run: ``python -m state_machines.demo``.
+
+Public modules: `ros` (states, action servers and calls for ROS 2), `ros.waiting` (of an executor's
+threads), `exceptions` (of calls, too), `verify` (checks before running), `export` (drawings),
+`transitions` (told as they happen), `checkpoint` (outlives a kill), `structure` (a machine looked
+at), `autonomy` (transitions that ask a person), `clock`, `userdata`, `testing` (fake clock,
+scripted outcomes).
 """
 
 from __future__ import annotations
