@@ -66,7 +66,6 @@ TO_BE_CUT = {
     'Observer',
     'Patrol',
     'RoomLook',
-    'WorldModel',
 }
 """Classes over the limits that own more than one thing."""
 KNOWING_ROS = {
@@ -157,17 +156,6 @@ PAST_THE_FACE = {
     'owl_reasoner.reasoner.datatypes',
     'owl_reasoner.reasoner.explanation',
     'owl_reasoner.reasoner.non_entailment',
-    'patrol_policy.battery',
-    'patrol_policy.decision',
-    'patrol_policy.fleet',
-    'patrol_policy.graph',
-    'patrol_policy.hours',
-    'patrol_policy.patrolling_sim',
-    'patrol_policy.plan',
-    'patrol_policy.policies',
-    'patrol_policy.promises',
-    'patrol_policy.rule_table',
-    'patrol_policy.world',
 }
 """Modules of libraries that others import and that the library does not call public."""
 WITHOUT_TESTS = CHECKOUT / 'tests' / 'modules_without_tests.txt'

@@ -28,6 +28,7 @@ from statistics import fmean, median
 from typing import Any
 
 from patrol_policy.battery import LEARNED_FALL, Draw
+from patrol_policy.world import Decision
 from strict_files.files import FileError, KeptFile
 from surveillance_behaviour.charge_estimate import ChargeEstimate
 from surveillance_behaviour.mission.mission_log import (
@@ -97,6 +98,61 @@ def robust_mean(values: Collection[float], start: float, *, prior: float = 0.0) 
             return step
         estimate = step
     return estimate
+
+
+@dataclass(frozen=True)
+class TimedDrive:
+    """A drive that came where it was sent.
+
+    Attributes:
+        start: The place where it was decided.
+        seconds: From the decision to the arrival.
+    """
+
+    start: str
+    seconds: float
+
+
+class LegTimer:
+    """Times the present drive, from the decision to the arrival.
+
+    Args:
+        elapsed: Seconds as they pass, whatever the date is set to; None: the times that are told
+            count.
+    """
+
+    def __init__(self, elapsed: Callable[[], float] | None = None) -> None:
+        self._elapsed = elapsed
+        self._leg: Decision | None = None
+        self._began = 0.0
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a drive is timed."""
+        return self._leg is not None
+
+    def begin(self, decision: Decision) -> None:
+        """Begin with a decision."""
+        self._leg, self._began = decision, self._passed(decision.time)
+
+    def forget(self) -> None:
+        """End it: the drive is no example."""
+        self._leg = None
+
+    def end(self, place: str, now: float) -> TimedDrive | None:
+        """Return the drive that ended at a place; None: it was sent elsewhere, or forgotten.
+
+        Args:
+            place: Where the robot has come.
+            now: Seconds on the mission's clock.
+        """
+        leg, self._leg = self._leg, None
+        if leg is None or leg.place != place:
+            return None
+        return TimedDrive(leg.from_place, self._passed(now) - self._began)
+
+    def _passed(self, now: float) -> float:
+        return now if self._elapsed is None else self._elapsed()
 
 
 @dataclass

@@ -79,7 +79,7 @@ class Places(Protocol):
 
 
 class Reasoner(Protocol):
-    """Who decides where the robot goes: a `WorldModel`, here or in another process.
+    """Who decides where the robot goes: a `DecisionMaker`, here or in another process.
 
     A class need not define the methods that return nothing: it is then told in vain.
     """

@@ -1,4 +1,7 @@
-"""The node `reasoner`: answers `reason` with the place to go to next, in the behaviour `patrol`.
+"""The node `reasoner` is no OWL reasoner: it answers `reason` with the place to go to next.
+
+The name is that of the assignment; the node runs in the behaviour `patrol`. Reasoning about the
+ontology is `armor_server`'s.
 
 It takes one snapshot of the ontology, and decides by the same function as the behaviour
 `surveillance`: charging first, then an operator's request, then the rules and the policy. The
@@ -23,8 +26,8 @@ from state_machines.ros import ClockWait
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.ros_adapters.decision_services import (
     MemorySettings,
+    decision_maker_of,
     offer_decision_services,
-    world_model_of,
 )
 from surveillance_behaviour.ros_adapters.peers import (
     Deadlines,
@@ -54,7 +57,7 @@ class Reasoner(PatrolNode):
         )
         battery = BatteryMonitor()
         self._wait = ClockWait(self)
-        self._world_model = world_model_of(
+        self.decision_maker = decision_maker_of(
             self,
             settings,
             self.declare_fields(MemorySettings()),
@@ -82,18 +85,18 @@ class Reasoner(PatrolNode):
             Reason, 'reason', self._on_reason, callback_group=ReentrantCallbackGroup()
         )
         self._work = offer_decision_services(
-            self, self._world_model, self._wait.now, lambda: self._avoided
+            self, self.decision_maker, self._wait.now, lambda: self._avoided
         )
 
     def _on_status(self, status: MissionStatus) -> None:
         self._avoided = frozenset(status.avoided)
         if status.waiting_for_help or 'Recover' in status.state:
-            self._world_model.disturbed()
+            self.decision_maker.disturbed()
         if status.place and status.place != self._place:
             before, self._place = self._place, status.place
             # Where the robot was last when this node began, it may have left.
             if before:
-                self._world_model.arrived(status.place, seconds_of(status.stamp))
+                self.decision_maker.arrived(status.place, seconds_of(status.stamp))
 
     def _on_parameters(self, event: ParameterEvent) -> None:
         """Take over what is set in the node that owns the settings of decisions."""
@@ -120,7 +123,7 @@ class Reasoner(PatrolNode):
             # The lock is held until the request that began this choice has noted it as the next.
             self._next = None
         try:
-            return self._world_model.decide(self._wait.now(), self.stopping, self._avoided).place
+            return self.decision_maker.decide(self._wait.now(), self.stopping, self._avoided).place
         except CallInterruptedError:  # the node ends
             return ''
         except (CallError, NowhereToGoError) as error:

@@ -25,8 +25,8 @@ from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Ports
 from surveillance_behaviour.ros_adapters.decision_services import (
     MemorySettings,
+    decision_maker_of,
     offer_decision_services,
-    world_model_of,
 )
 from surveillance_behaviour.ros_adapters.looking import RosLooking
 from surveillance_behaviour.ros_adapters.peers import (
@@ -138,14 +138,15 @@ class RobotBehavior(PatrolNode):
             return Ports(
                 ontology, places, self._announcer, reasoner, routine=routine, looking=looking
             )
-        world_model = world_model_of(
-            self, settings, memory, ontology, places, battery, clock.elapsed
-        )
+        maker = decision_maker_of(self, settings, memory, ontology, places, battery, clock.elapsed)
         offer_decision_services(
-            self, world_model, clock.now, lambda: self.mission.recovery.avoided(self.mission.now())
+            self,
+            maker,
+            clock.now,
+            lambda: self.mission.recovery.avoided(self.mission.now()),
         )
         motion = RosMotion(self, deadlines)
-        return Ports(ontology, places, self._announcer, world_model, motion=motion, looking=looking)
+        return Ports(ontology, places, self._announcer, maker, motion=motion, looking=looking)
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""

@@ -1,10 +1,10 @@
 """A fleet whose links and programs fail, in this process: what comes of its visits.
 
 Each robot is a host of its own, and the ontology is another one. Deciding, sharing and right of way
-are the real ones (`WorldModel`, `FleetKnowledge`, the messages of `fleet_robots`, `Experience` with
-its file and the mission's record); driving is a straight way in its time. A link is cut, or loses
-and delays what passes; the programs of a robot are killed and start again from their files; the
-ontology's host goes down with what it knew on its disk.
+are the real ones (`DecisionMaker`, `FleetKnowledge`, the messages of `fleet_robots`, `Experience`
+with its file and the mission's record); driving is a straight way in its time. A link is cut, or
+loses and delays what passes; the programs of a robot are killed and start again from their files;
+the ontology's host goes down with what it knew on its disk.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ from patrol_policy.rule_table import URGENT, Priorities
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
+from surveillance_behaviour.decision_maker import DecisionMaker
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of
-from surveillance_behaviour.world_model import WorldModel
+from surveillance_behaviour.traffic import FleetTraffic
 
 from .scripted_world import POSITIONS, World
 
@@ -130,13 +131,13 @@ class Robot:
         settings = DecisionSettings(
             priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')), urgency_threshold=int(THRESHOLD)
         )
-        self.model = WorldModel(
+        self.model = DecisionMaker(
             settings,
             self.world,
             self.world,
             self.world.battery,
             Experience.of_record(str(self.record)),
-            fleet=self.knowledge,
+            traffic=FleetTraffic(self.knowledge, settings),
         )
 
     def kill(self) -> None:

@@ -17,11 +17,11 @@ from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decision_maker import DecisionMaker
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
-from surveillance_behaviour.world_model import WorldModel
 from surveillance_ontology.robot_ontology import Snapshot
 from tests.seven_rooms import SEVEN_ROOMS
 
@@ -287,8 +287,8 @@ class World:
     ) -> Mission:
         """Return a mission in this world."""
         settings = settings or MissionSettings(settle_seconds=0.0)
-        kind = ScriptedReasoner if machine == 'patrol' else WorldModel
-        self.world_model = kind(
+        kind = ScriptedReasoner if machine == 'patrol' else DecisionMaker
+        self.decision_maker = kind(
             settings.choice,
             self,
             self,
@@ -297,22 +297,22 @@ class World:
             warn=self.said.append,
             announce=self.decided,
         )
-        self.world_model.world_of_test = self  # type: ignore[attr-defined]
+        self.decision_maker.world_of_test = self  # type: ignore[attr-defined]
         ports = Ports(
             ontology=self,
             places=self,
             announcer=self,
-            reasoner=self.world_model,
+            reasoner=self.decision_maker,
             motion=ScriptedMotion(self),
             routine=ScriptedRoutine(self),
         )
         mission = Mission('scripted', settings, ports, self.battery, self.clock, record)
         self.avoided = lambda: mission.recovery.avoided(mission.now())
-        self.world_model.learn_draw(self.clock.now)
+        self.decision_maker.learn_draw(self.clock.now)
         return mission
 
 
-class ScriptedReasoner(WorldModel):
+class ScriptedReasoner(DecisionMaker):
     """Decides in another process: what is called there may fail."""
 
     world_of_test: World

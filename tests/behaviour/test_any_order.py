@@ -56,9 +56,9 @@ class CheckedWorld(World):
             return
         reachable = set(self.neighbours(self.is_in))
         allowed = reachable - self.avoided() or reachable
-        world = self.world_model.world
+        world = self.decision_maker.world
         assert world is not None
-        energy = energy_of(world, self.world_model.battery(), self.world_model.settings)
+        energy = energy_of(world, self.decision_maker.battery(), self.decision_maker.settings)
         if energy is not None:
             # A fall of the charge that is the only one yet tells of a small range.
             allowed = {place for place in allowed if energy.within_range[energy.index[place]]}

@@ -17,9 +17,10 @@ from patrol_policy.rule_table import URGENT, Priorities
 from patrol_policy.world import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
+from surveillance_behaviour.decision_maker import DecisionMaker
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of, without_future
-from surveillance_behaviour.world_model import WorldModel
+from surveillance_behaviour.traffic import FleetTraffic, Traffic
 
 from .scripted_world import POSITIONS, World
 
@@ -75,6 +76,7 @@ class Robot:
         start: str,
         rules: tuple[str, ...] = (),
         stations: Mapping[str, Station] = MappingProxyType({}),
+        is_alone: bool = False,
     ) -> None:
         self.world = CutWorld(start_place=start)
         self.world.is_in = start
@@ -87,8 +89,9 @@ class Robot:
             name, FleetSettings(silent_after=10.0), WIDE, air.say, lambda: air.now
         )
         settings = DecisionSettings(priorities=Priorities(rules), urgency_threshold=240)
+        self.traffic = FleetTraffic(self.fleet, settings)
         self.said: list[str] = []
-        self.model = WorldModel(
+        self.model = DecisionMaker(
             settings,
             self.world,
             self.world,
@@ -96,7 +99,7 @@ class Robot:
             warn=self.said.append,
             announce=self.decisions.append,
             tell=self.said.append,
-            fleet=self.fleet,
+            traffic=Traffic() if is_alone else self.traffic,
             stations=stations,
         )
         self.due = 0.0
@@ -248,8 +251,7 @@ def test_an_ontology_that_does_not_answer_is_not_waited_for_again_at_each_decisi
 
 def test_one_robot_alone_without_an_ontology_waits_as_ever() -> None:
     air = Air()
-    robot = Robot(air, 'robot1', 'E')
-    robot.model.fleet = None
+    robot = Robot(air, 'robot1', 'E', is_alone=True)
     robot.world.away = True
     with pytest.raises(CallError):
         robot.model.decide(0.0, NOBODY)
@@ -309,14 +311,14 @@ def test_a_robot_that_stands_on_its_way_is_told_of() -> None:
 def test_a_robot_is_taken_out_and_put_back() -> None:
     air, (first, second) = patrol(2)
     air.run(100.0)
-    assert second.model.take_out(True) == 'robot2 is taken out: the others have its places'
+    assert second.traffic.take_out(True) == 'robot2 is taken out: the others have its places'
     begin = len(second.visits)
     air.run(300.0)
     # What it was on its way to it still reaches.
     assert len(second.visits) <= begin + 1
     assert second.decisions[-1].reason == 'no place is mine: robot2 is taken out'
     assert {where for at, where in first.visits if at > 130.0} == set(first.world.rooms)
-    second.model.take_out(False)
+    second.traffic.take_out(False)
     air.run(100.0)
     assert len(second.visits) > begin + 3
 

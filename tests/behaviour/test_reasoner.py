@@ -30,7 +30,7 @@ def test_requests_that_come_while_a_choice_is_made_share_the_next_one(
         assert done.wait(60.0)
         raise CallError('armor: away')
 
-    monkeypatch.setattr(reasoner._world_model, 'decide', look)
+    monkeypatch.setattr(reasoner.decision_maker, 'decide', look)
     client = graph.node.create_client(Reason, 'reason')
     graph.until(client.service_is_ready)
     answers = [client.call_async(Reason.Request())]
@@ -69,7 +69,7 @@ def test_a_choice_that_begins_at_once_is_given_once(graph: Any, monkeypatch: Any
         return future
 
     graph_pause = threading.Event()
-    monkeypatch.setattr(reasoner._world_model, 'decide', choose_now)
+    monkeypatch.setattr(reasoner.decision_maker, 'decide', choose_now)
     monkeypatch.setattr(reasoner._work, 'run', run_and_wait)
     client = graph.node.create_client(Reason, 'reason')
     graph.until(client.service_is_ready)
@@ -87,20 +87,20 @@ def test_a_choice_that_ends_with_its_node_is_no_failure(graph: Any, monkeypatch:
         raise CallInterruptedError
 
     monkeypatch.setattr(reasoner.get_logger(), 'warn', warned.append)
-    monkeypatch.setattr(reasoner._world_model, 'decide', interrupted)
+    monkeypatch.setattr(reasoner.decision_maker, 'decide', interrupted)
     assert reasoner._choose() == ''
     assert not warned
 
 
 def test_the_hours_of_a_place_that_was_changed_are_told_with_the_promises(graph: Any) -> None:
     reasoner = graph.add(Reasoner)
-    model, told = reasoner._world_model, list[DiagnosticArray]()
+    model, told = reasoner.decision_maker, list[DiagnosticArray]()
     graph.node.create_subscription(DiagnosticArray, 'promises', told.append, STATE_QOS)
     places = graph.node.create_publisher(String, 'place', STATE_QOS)
     described = {'room_positions': {'R1': [1.0, 1.0]}, 'hours': {'R1': 'mon-fri 08:00-18:00'}}
     places.publish(String(data=json.dumps(described)))
-    graph.until(lambda: 'R1' in model._rules.calendar.hours)
-    model._promise((Promise('R1', WITHIN, 60.0, 30.0, 'R1: visited'),))
+    graph.until(lambda: 'R1' in model.rules.calendar.hours)
+    model.promises.publish((Promise('R1', WITHIN, 60.0, 30.0, 'R1: visited'),))
     graph.until(lambda: bool(told))
     assert promises_from(told[-1])[1] == {'R1': 'mon-fri 08:00-18:00'}
 
@@ -117,6 +117,6 @@ def test_a_robot_of_a_fleet_keeps_its_dock_when_the_place_is_changed(graph: Any)
         'hours': {'R4': 'mon-fri 08:00-18:00'},
     }
     places.publish(String(data=json.dumps(described)))
-    graph.until(lambda: 'R4' in reasoner._world_model._rules.calendar.hours)
-    graph.until(lambda: set(reasoner._world_model._stations) == {'E', 'R4'})
+    graph.until(lambda: 'R4' in reasoner.decision_maker.rules.calendar.hours)
+    graph.until(lambda: set(reasoner.decision_maker.stations) == {'E', 'R4'})
     assert reasoner.get_parameter('recharge_rooms').value == ['E']

@@ -181,7 +181,7 @@ class Robot:
         )
         monitors = [] if behavior is None else [behavior.mission.battery]
         if reasoner is not None:
-            monitors.append(reasoner._world_model._battery)
+            monitors.append(reasoner.decision_maker._battery)
         return battery is None or all(
             self.heard_of_battery.get(each) == battery._said for each in monitors
         )

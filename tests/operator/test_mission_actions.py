@@ -199,7 +199,7 @@ def test_what_a_person_sets_reaches_the_node_that_decides(
     behaviour = graph.add(PatrolNode, name='robot_behavior')
     owned = behaviour.declare_live(DecisionSettings())
     reasoner = graph.add(Reasoner, parameters={'robot_speed': 2.0})
-    follows = reasoner._world_model.settings
+    follows = reasoner.decision_maker.settings
     graph.until(lambda: behaviour.count_subscribers('/parameter_events'))
     assert actions.set_threshold('90') == 'urgency_threshold of robot_behavior is 90'
     assert actions.set_policy('oldest') == "policy of robot_behavior is 'oldest'"

@@ -1,9 +1,11 @@
 """Where a patrol robot goes next: rules, policies within them, the battery, and why.
 
-- `graph`: a map as places and legs in seconds; `tour`: its shortest tour;
-- `decision`: `decide(world, battery, settings)`, the one function that decides; `why_not`;
-- `policies`, `plan`, `rollout`, `rounds`: which of the allowed places;
-- `battery`: when to go charging; `simulation`: a patrol in simulated time.
+Begin with ``python -m patrol_policy.demo``, then `decide` in `decision`, the one function that
+decides; it is asked with what is known (`world`), the `battery` and settings. Which class of places
+comes first is in `rule_table`, which of its places in `policies`; the others follow from these.
+
+Public modules: `battery`, `bounds`, `decision`, `fleet`, `graph`, `hours`, `patrolling_sim`, `plan`,
+`policies`, `promises`, `rule_table`, `simulation`, `tour`, `world`.
 """
 
 from __future__ import annotations

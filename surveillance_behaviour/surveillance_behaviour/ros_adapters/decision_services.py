@@ -1,4 +1,4 @@
-"""What a node that decides has and offers: its world model, `decision`, `why_not` and `go_to`."""
+"""What a node that decides has and offers: its `DecisionMaker`, `decision`, `why_not`, `go_to`."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from state_machines.exceptions import CallError
 from strict_files.settings import parameter
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
+from surveillance_behaviour.decision_maker import DecisionMaker
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.ports import Ontology, Places
 from surveillance_behaviour.ros_adapters.fleet_topic import fleet_of
-from surveillance_behaviour.world_model import WorldModel
+from surveillance_behaviour.traffic import FleetTraffic, Traffic
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_interfaces.srv import GoTo, WhyNot
 from surveillance_runtime.node import PatrolNode
@@ -55,7 +56,7 @@ class MemorySettings:
     )
 
 
-def world_model_of(
+def decision_maker_of(
     node: PatrolNode,
     settings: DecisionSettings,
     memory: MemorySettings,
@@ -63,7 +64,7 @@ def world_model_of(
     places: Places,
     battery: BatteryMonitor,
     elapsed: Callable[[], float],
-) -> WorldModel:
+) -> DecisionMaker:
     """Return what a robot knows when it decides, with what it learned before.
 
     It learns how fast the battery falls. Its decisions are published and logged, numbered from 1.
@@ -107,15 +108,15 @@ def world_model_of(
 
     robot = str(node.get_parameter('robot_name').value)
     fleet = fleet_of(node, robot, settings.recharge_rooms)
-
-    def settle(interrupt: Interrupt) -> None:
-        interrupt.wait(SETTLE)
+    traffic = Traffic()
+    if fleet is not None:
+        traffic = FleetTraffic(fleet, settings, _settle)
 
     def promise(found: tuple[Promise, ...]) -> None:
         stamp = node.get_clock().now().to_msg()
         promises_topic.publish(conversions.promises_message(found, hours, stamp))
 
-    world_model = WorldModel(
+    decision_maker = DecisionMaker(
         settings,
         ontology,
         places,
@@ -128,11 +129,10 @@ def world_model_of(
         rules,
         lambda sentence: log.info(sentence),
         stations,
-        fleet,
-        settle,
+        traffic,
         promise,
     )
-    world_model.learn_draw(elapsed)
+    decision_maker.learn_draw(elapsed)
 
     def take_place(described: Mapping[str, Any]) -> None:
         """Take the rules and the stations of a place that was changed."""
@@ -140,10 +140,10 @@ def world_model_of(
         changed = patrol_rules(described)
         found = stations_in(described)
         hours = changed.calendar.in_words()
-        world_model.take_rules(changed)
+        decision_maker.take_rules(changed)
         stations.clear()
         stations.update(found)
-        world_model.take_stations(found)
+        decision_maker.take_stations(found)
         rooms = [str(each) for each in described.get('recharge_rooms') or ()]
         # Of a fleet stations are read at the start, and a robot may have one of them alone.
         if fleet is None and rooms != list(settings.recharge_rooms):
@@ -153,7 +153,11 @@ def world_model_of(
                 log.error(f'topic {TOPIC}: {answer.reason}')
 
     follow_place(node, take_place)
-    return world_model
+    return decision_maker
+
+
+def _settle(interrupt: Interrupt) -> None:
+    interrupt.wait(SETTLE)
 
 
 def _stations_expected(
@@ -174,7 +178,7 @@ def _stations_expected(
 
 def offer_decision_services(
     node: PatrolNode,
-    world_model: WorldModel,
+    decision_maker: DecisionMaker,
     now: Callable[[], float],
     avoided: Callable[[], frozenset[str]],
 ) -> AwaitedWork:
@@ -182,7 +186,7 @@ def offer_decision_services(
 
     Args:
         node: The node that decides.
-        world_model: What decides.
+        decision_maker: What decides.
         now: Seconds on the mission's clock.
         avoided: The places that could not be reached lately.
 
@@ -195,7 +199,7 @@ def offer_decision_services(
     async def on_why_not(request: Any, response: Any) -> Any:
         def answer() -> None:
             try:
-                told = world_model.why_not(request.place, now(), node.stopping, avoided())
+                told = decision_maker.why_not(request.place, now(), node.stopping, avoided())
             except (ValueError, CallError) as error:
                 response.success, response.message = False, str(error)
                 return
@@ -207,17 +211,18 @@ def offer_decision_services(
 
     def on_go_to(request: Any, response: Any) -> Any:
         try:
-            response.message = world_model.request(request.place)
+            response.message = decision_maker.request(request.place)
             response.success = True
             node.get_logger().info(response.message)
         except ValueError as error:
             response.message = str(error)
         return response
 
-    if world_model.fleet is not None:
+    traffic = decision_maker.traffic
+    if isinstance(traffic, FleetTraffic):
 
         def on_take_out(request: Any, response: Any) -> Any:
-            response.message, response.success = world_model.take_out(request.data), True
+            response.message, response.success = traffic.take_out(request.data), True
             node.get_logger().info(response.message)
             return response
 

@@ -16,9 +16,9 @@ import pytest
 from floor_plans import PatrolRules
 from patrol_policy.decision import REQUEST, DecisionSettings, NowhereToGoError
 from state_machines import Interrupt
+from surveillance_behaviour.decision_maker import DecisionMaker
 from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.mission.mission_log import MissionRecord
-from surveillance_behaviour.world_model import WorldModel
 from surveillance_ontology.robot_ontology import Snapshot
 
 from .scripted_world import World
@@ -26,15 +26,15 @@ from .scripted_world import World
 NOBODY = Interrupt()
 
 
-def world_model(world: World, record: Path) -> WorldModel:
+def decision_maker(world: World, record: Path) -> DecisionMaker:
     experience = Experience.of_record(str(record))
     assert not experience.problem
-    return WorldModel(DecisionSettings(), world, world, world.battery, experience)
+    return DecisionMaker(DecisionSettings(), world, world, world.battery, experience)
 
 
 def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
     world = World()
-    model = world_model(world, tmp_path / 'events.jsonl')
+    model = decision_maker(world, tmp_path / 'events.jsonl')
     model.begin(1.0, NOBODY)
     world.seen_at = 2_500_000_000
     model.decide(4.0, NOBODY)
@@ -51,10 +51,10 @@ def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
 
 def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
     world, record = World(), tmp_path / 'events.jsonl'
-    first = world_model(world, record)
+    first = decision_maker(world, record)
     first.begin(1.0, NOBODY)
     assert 'goes to R4' in first.request('R4')
-    decision = world_model(world, record).decide(2.0, NOBODY)
+    decision = decision_maker(world, record).decide(2.0, NOBODY)
     assert (decision.rule, decision.place) == (REQUEST, 'R4')
 
 
@@ -63,18 +63,18 @@ def test_a_request_ends_when_the_robot_has_been_there_or_cannot_go(
     tmp_path: Path, avoided: frozenset[str]
 ) -> None:
     world, record = World(), tmp_path / 'events.jsonl'
-    first = world_model(world, record)
+    first = decision_maker(world, record)
     first.begin(1.0, NOBODY)
     first.request('R4')
     if not avoided:
         world.is_in = 'R4'
     assert first.decide(2.0, NOBODY, avoided).rule != REQUEST
-    assert world_model(world, record).decide(3.0, NOBODY).rule != REQUEST
+    assert decision_maker(world, record).decide(3.0, NOBODY).rule != REQUEST
 
 
 def test_a_request_behind_a_door_that_closed_is_said_and_the_patrol_goes_on() -> None:
     world, said = World(), list[str]()
-    told = WorldModel(DecisionSettings(), world, world, world.battery, warn=said.append)
+    told = DecisionMaker(DecisionSettings(), world, world, world.battery, warn=said.append)
     told.begin(1.0, NOBODY)
     told.request('R4')
     world.closed.update(world.rooms['R4'])
@@ -86,7 +86,7 @@ def test_a_request_behind_a_door_that_closed_is_said_and_the_patrol_goes_on() ->
 
 def test_a_request_waits_while_no_charging_place_can_be_reached() -> None:
     world, said = World(start_place='C1'), list[str]()
-    told = WorldModel(DecisionSettings(), world, world, world.battery, warn=said.append)
+    told = DecisionMaker(DecisionSettings(), world, world, world.battery, warn=said.append)
     told.begin(1.0, NOBODY)
     told.request('R1')
     world.battery.set_level(1.0)
@@ -100,7 +100,7 @@ def test_a_request_waits_while_no_charging_place_can_be_reached() -> None:
 
 def test_the_ontology_knows_until_when_the_robot_was_in_a_place() -> None:
     world = World()
-    told = WorldModel(DecisionSettings(), world, world, world.battery)
+    told = DecisionMaker(DecisionSettings(), world, world, world.battery)
     told.begin(1.0, NOBODY)
     told.decide(20.0, NOBODY)
     assert world.visited_at['E'] == 20.0
@@ -116,7 +116,7 @@ def test_a_clock_that_is_set_back_while_nobody_decides_empties_no_visit(
         record.write('visit', date + 10.0, place='C1', distance=0.0)
         record.write('visit', date + 30.0, place='E', distance=0.0)
     world.visited_at |= {'C1': date + 10.0, 'E': date + 30.0}
-    told = world_model(world, path)
+    told = decision_maker(world, path)
     now = date + 30.0 + after
     told.begin(now, NOBODY)
     assert told.experience.visits == {'C1': now - 20.0, 'E': now}
@@ -126,7 +126,7 @@ def test_a_decision_says_which_facts_clash_while_they_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = World()
-    told = world_model(world, tmp_path / 'events.jsonl')
+    told = decision_maker(world, tmp_path / 'events.jsonl')
     told.begin(1.0, NOBODY)
     clash, right = 'ontology map is inconsistent because R4 is ROOM and R4 is DOOR', world.snapshot
     monkeypatch.setattr(world, 'snapshot', lambda *args: replace(right(*args), contradiction=clash))
@@ -140,7 +140,7 @@ def test_an_alert_is_urgent_at_once_though_its_place_has_a_longer_threshold(
 ) -> None:
     world, right = World(), World.snapshot
     rules = PatrolRules(thresholds={'R1': 86_400.0, 'R2': 86_400.0})
-    told = WorldModel(DecisionSettings(), world, world, world.battery, rules=rules)
+    told = DecisionMaker(DecisionSettings(), world, world, world.battery, rules=rules)
 
     def snapshot(self: World, now: float, classes: Sequence[str], *args: Any) -> Snapshot:
         assert 'ALERT' in classes
@@ -165,7 +165,7 @@ def test_a_place_is_urgent_beyond_its_own_threshold_and_not_at_it(
 ) -> None:
     world, right = World(), World.snapshot
     rules = PatrolRules(thresholds={'R2': 50.0})
-    told = WorldModel(DecisionSettings(), world, world, world.battery, rules=rules)
+    told = DecisionMaker(DecisionSettings(), world, world, world.battery, rules=rules)
 
     def snapshot(*args: Any) -> Snapshot:
         found = right(*args)
@@ -180,7 +180,7 @@ def test_a_place_is_urgent_beyond_its_own_threshold_and_not_at_it(
 
 def test_a_request_is_taken_while_somebody_looks(tmp_path: Path) -> None:
     world = World()
-    told = world_model(world, tmp_path / 'events.jsonl')
+    told = decision_maker(world, tmp_path / 'events.jsonl')
     told.begin(1.0, NOBODY)
     answered, asked, right = threading.Event(), threading.Event(), world.snapshot
 
@@ -211,9 +211,9 @@ def test_the_shortest_tour_is_looked_for_when_the_map_changes_not_with_each_leg(
         lengths.append(tour)
         return 'too short' if threshold < tour else ''
 
-    monkeypatch.setattr('surveillance_behaviour.world_model.tour_warning', warning)
+    monkeypatch.setattr('surveillance_behaviour.announcements.tour_warning', warning)
     settings = DecisionSettings(urgency_threshold=1e6)
-    told = WorldModel(settings, world, world, world.battery, warn=warnings.append)
+    told = DecisionMaker(settings, world, world, world.battery, warn=warnings.append)
     told.begin(1.0, NOBODY)
     for drive in range(5):
         told.experience.leg_times.observe('E', 'C1', 8.0 + 0.1 * drive, 5.0, 5.0)
@@ -254,7 +254,7 @@ def test_what_was_learned_and_cannot_be_read_is_said(
 
 def test_a_place_that_is_taken_while_somebody_looks_falsifies_no_leg() -> None:
     world = World()
-    told = WorldModel(DecisionSettings(), world, world, world.battery)
+    told = DecisionMaker(DecisionSettings(), world, world, world.battery)
     whole = told.look(1.0, NOBODY).graph.leg_seconds
     rules = PatrolRules(exploration={'R1': 60.0})
 
@@ -272,7 +272,7 @@ def test_a_place_that_is_taken_while_somebody_looks_falsifies_no_leg() -> None:
 def test_who_is_sent_home_goes_to_the_station_that_is_next_from_where_the_robot_is_now() -> None:
     world = World()
     settings = DecisionSettings(recharge_rooms=('E', 'R4'))
-    told = WorldModel(settings, world, world, world.battery)
+    told = DecisionMaker(settings, world, world, world.battery)
     with pytest.raises(ValueError, match='the map is not known yet'):
         told.request('')
     told.begin(1.0, NOBODY)
