@@ -4,8 +4,8 @@ Begin with ``python -m patrol_policy.demo``, then `decide` in `decision`, the on
 decides; it is asked with what is known (`world`), the `battery` and settings. Which class of places
 comes first is in `rule_table`, which of its places in `policies`; the others follow from these.
 
-Public modules: `battery`, `bounds`, `decision`, `fleet`, `graph`, `hours`, `patrolling_sim`, `plan`,
-`policies`, `promises`, `rule_table`, `simulation`, `tour`, `world`.
+Public modules: `battery`, `bounds`, `decision`, `fleet`, `graph`, `hours`, `patrolling_sim`,
+`plan`, `policies`, `promises`, `rule_table`, `simulation`, `tour`, `world`.
 """
 
 from __future__ import annotations
