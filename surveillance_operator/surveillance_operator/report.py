@@ -26,7 +26,7 @@ from surveillance_operator.recording import bag
 from surveillance_operator.recording.runs import find_run, robots_of, run_parser
 from surveillance_operator.run_entries import RunEntries, entries_of_run, incidents_of
 from surveillance_runtime.command_line import EXIT_BAD_INPUT
-from surveillance_runtime.event_log import KINDS, RECORD, RecordEntry, Section, record_in
+from surveillance_runtime.event_log import KINDS, RECORD, RecordEntry, Section, gaps, record_in
 from surveillance_runtime.run_files import PLACE, RECORDING
 
 NAME, PICTURE = 'report.html', 'report.png'
@@ -325,6 +325,11 @@ def _page(folder: Path, happened: RunEntries, drawn: str, bound: float | None) -
     ]
     if told := happened.problem():
         body.append(f'<p class="late">{escape(told)}</p>')
+    for gap in gaps(happened.entries):
+        body.append(
+            f'<p class="late">The disk was full: of what happened from {_clock(gap.begin - start)} '
+            f'to {_clock(gap.end - start)} something is missing.</p>'
+        )
     if not is_whole:
         body.append(
             f'<p>All figures are of the whole mission; map, strips and lists begin at '

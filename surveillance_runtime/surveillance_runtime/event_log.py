@@ -24,11 +24,17 @@ The log of a month stays small to read: a file that has grown is packed as ``FIL
 ``FILE.0002.gz``, ..., and the new one begins with a ``snapshot`` of all that was counted
 (`EventLog.begin_segment`). `read` takes the last file only; `read_all` gives every entry.
 
+A disk that is full costs nothing for a long while: so much of it is taken beforehand (`RESERVE`).
+After that what happens waits in memory, and the log says so in a ``gap``: where the process ends
+before there is space, a reader knows from when to when something is missing (`gaps`).
+
 A reader passes over kinds that it does not know, and counts them: they are of a later version.
 """
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import errno
 import fcntl
 import glob
@@ -139,6 +145,7 @@ KINDS: Mapping[str, EntryKind] = {
     'restart': EntryKind(
         ('node', 'why'), is_of_mission=False, section=Section('Restarts', ('node', 'why'))
     ),
+    'gap': EntryKind(('phase', 'why'), is_of_mission=False),
     'parameter': EntryKind(
         ('node', 'name', 'value'),
         is_of_mission=False,
@@ -156,6 +163,10 @@ SEGMENT_BYTES = 4_000_000
 """Size from which on a log's file is packed away and a new one begun."""
 MOST_WAITING = 4_000_000
 """Bytes of entries that wait until the disk takes more; of more than these the newest."""
+RESERVE = 131_072
+"""Bytes of the disk that are taken beyond a log's end, so that it goes on when the disk is full."""
+LAST_WORDS = 1000
+"""Bytes of these that are left for the line that says that nothing more is written."""
 LARGEST = 1_000_000_000
 """Bytes of a log's file that are read at most."""
 LOCK_PATIENCE = 0.5
@@ -254,6 +265,8 @@ class EventLog:
         self._next = self.path.with_name(self.path.name + '.next')
         self._descriptor = -1
         self._boot = _boot()
+        self._reserved_until = 0.0
+        self._has_told_of_gap = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             files.file_to_write(self.path)
@@ -303,8 +316,12 @@ class EventLog:
             if self._boot:
                 entry, self._boot = replace(entry, boot=self._boot), ''
             self._waiting += line_of(entry)
+            lines = self._waiting
+            if self._has_told_of_gap:
+                why = 'some of what waited is lost' if self._lost else 'what waited is written'
+                lines += line_of(self.entry('gap', phase='end', why=why, lost=bool(self._lost)))
             try:
-                size = self._append(self._waiting)
+                size = self._append(lines)
             except OSError as error:
                 if len(self._waiting) > MOST_WAITING:
                     self._waiting = self._waiting[-MOST_WAITING:].partition(b'\n')[2]
@@ -312,11 +329,13 @@ class EventLog:
                 raise FileError(
                     f'cannot write the mission record {self.path}: {error.strerror}{self._lost}'
                 ) from None
-            self._waiting, self._lost = b'', ''
+            self._waiting, self._lost, self._has_told_of_gap = b'', '', False
             return size
 
     def _append(self, lines: bytes) -> int:
         with self._locked() as descriptor:
+            if not self._reserve(descriptor):
+                self._expect_room(descriptor, len(lines))
             written = os.write(descriptor, lines)
             size = os.fstat(descriptor).st_size
             if written != len(lines):
@@ -324,6 +343,42 @@ class EventLog:
                 os.ftruncate(descriptor, size - written)
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             return size
+
+    def _reserve(self, descriptor: int) -> bool:
+        """Take more of the disk beyond the log's end; return whether that is possible, or useless.
+
+        Where it is not, there is still what was taken before.
+        """
+        size = os.fstat(descriptor).st_size
+        if size + RESERVE / 2 <= self._reserved_until:
+            return True
+        try:
+            allocate(descriptor, size, RESERVE)
+        except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EDQUOT):
+                return False
+            self._reserved_until = math.inf  # no such thing on this file system
+            return True
+        self._reserved_until = size + RESERVE
+        return True
+
+    def _expect_room(self, descriptor: int, wanted: int) -> None:
+        """Make sure that a full disk has room for what is to be written, and for the last words.
+
+        Raises:
+            OSError: It has not; the log says so, where it can.
+        """
+        status = os.fstat(descriptor)
+        left = 512 * status.st_blocks - status.st_size
+        if left >= wanted + LAST_WORDS:
+            return
+        full = os.strerror(errno.ENOSPC)
+        if not self._has_told_of_gap:
+            line = line_of(self.entry('gap', phase='begin', why=full))
+            with contextlib.suppress(OSError):
+                if left >= len(line) and os.write(descriptor, line) == len(line):
+                    self._has_told_of_gap = True
+        raise OSError(errno.ENOSPC, full)
 
     @contextmanager
     def _locked(self) -> Iterator[int]:
@@ -391,6 +446,22 @@ class EventLog:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def allocate(descriptor: int, begin: int, length: int) -> None:
+    """Take so many bytes of the disk for a file, whose size stays (fallocate(2)).
+
+    Raises:
+        OSError: The disk is full, or the file system has no such thing.
+    """
+    if _LIBC.fallocate(descriptor, _KEEP_SIZE, begin, length):
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
+
+
+_KEEP_SIZE = 1
+_LIBC = ctypes.CDLL(None, use_errno=True)
+_LIBC.fallocate.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64]
 
 
 def _end_whole(descriptor: int) -> None:
@@ -561,6 +632,38 @@ def _seconds(value: object) -> float:
 def of_mission(entries: Iterable[RecordEntry]) -> Iterator[RecordEntry]:
     """Give the entries that the behaviour wrote."""
     return (entry for entry in entries if entry.kind.is_of_mission)
+
+
+class Gap(NamedTuple):
+    """A time of which something is missing in a log.
+
+    Attributes:
+        begin, end: Of the entries around it, seconds on the mission's clock.
+    """
+
+    begin: float
+    end: float
+
+
+def gaps(entries: Iterable[RecordEntry]) -> list[Gap]:
+    """Return the times of which something is missing, since the disk was full."""
+    found: list[Gap] = []
+    begun: RecordEntry | None = None
+    for entry in entries:
+        is_end = entry.name == 'gap' and entry.text('phase') == 'end'
+        if is_end and begun is not None:
+            if entry.fields.get('lost'):
+                found.append(Gap(begun.time, entry.time))
+            begun = None
+        elif entry.name == 'gap':
+            begun = entry
+        elif entry.name == 'start' and begun is not None:
+            # Whoever wrote it ended before there was space.
+            found.append(Gap(begun.time, entry.time))
+            begun = None
+    if begun is not None:
+        found.append(Gap(begun.time, entry.time))
+    return found
 
 
 # --- clocks ---

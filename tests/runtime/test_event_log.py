@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -14,7 +15,7 @@ import pytest
 from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
 from surveillance_runtime import event_log
-from surveillance_runtime.event_log import KINDS, EventLog, check, read, read_all
+from surveillance_runtime.event_log import KINDS, EventLog, check, gaps, read, read_all
 
 pytestmark = pytest.mark.unit
 
@@ -143,3 +144,63 @@ def test_each_kind_of_the_table_is_complete(name: str) -> None:
     if kind.fields:
         with pytest.raises(FileError, match='lacks'):
             check(name, {}, 'here')
+
+
+class FullDisk:
+    """A disk that gives a log nothing more than it has taken already."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.is_full = False
+        self._allocate = event_log.allocate
+        monkeypatch.setattr(event_log, 'allocate', self.allocate)
+
+    def allocate(self, *args: int) -> None:
+        if self.is_full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self._allocate(*args)
+
+
+def until_it_waits(record: MissionRecord) -> int:
+    """Visit until the log takes no more; return how many visits it took."""
+    for number in range(10_000):
+        try:
+            record.write('visit', 10.0 + number, place='E', distance=1.0)
+        except FileError:
+            return number
+    raise AssertionError('it takes all')
+
+
+def test_a_full_disk_costs_no_visit_for_long_and_then_the_log_says_so(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = FullDisk(monkeypatch)
+    record = MissionRecord(path)
+    record.write('start', 0.0, machine='patrol', place='E', places=['E'])
+    disk.is_full = True
+    kept = until_it_waits(record)
+    assert kept > 300
+    for _ in range(9):
+        with pytest.raises(FileError):
+            record.write('visit', 20_000.0, place='E', distance=1.0)
+    # It is killed, and started again when there is space.
+    assert summarize(read(path)).visits == {'E': kept}
+    disk.is_full = False
+    with MissionRecord(path) as again:
+        again.write('start', 30_000.0, machine='patrol', place='E', places=['E'])
+    (gap,) = gaps(read(path))
+    assert gap.begin == pytest.approx(10.0 + kept, abs=2.0)
+    assert gap.end == 30_000.0
+
+
+def test_nothing_is_missing_where_what_waited_was_written(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = FullDisk(monkeypatch)
+    with MissionRecord(path) as record:
+        record.write('start', 0.0, machine='patrol', place='E', places=['E'])
+        disk.is_full = True
+        kept = until_it_waits(record)
+        disk.is_full = False
+        record.write('visit', 20_000.0, place='E', distance=1.0)
+    assert summarize(read(path)).visits == {'E': kept + 2}
+    assert gaps(read(path)) == []
