@@ -379,7 +379,7 @@ def _map_of(parameters: Mapping[str, Any]) -> OccupancyMap | None:
     from floor_plans.occupancy_map import read_map
 
     try:
-        return read_map(name, resolution=resolution, origin=origin)
+        return read_map(name, resolution=resolution, origin=origin).as_saved()
     except FileError as error:
         raise PlaceError(('map_file',), str(error)) from None
 

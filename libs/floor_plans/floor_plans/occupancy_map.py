@@ -1,9 +1,13 @@
 """Maps in map_server's format: a YAML file beside a picture, as ROS 1 and ROS 2 write them.
 
 The YAML file names the picture, the side of a pixel in metres, the pose of the picture's lower left
-corner in the world, and how a pixel's brightness becomes occupancy (`mode`, `negate`, thresholds;
-nav2_map_server's `map_io.cpp` is followed, with its rules for transparency). A picture alone is a
-map, too, once somebody says how large its pixels are.
+corner in the world, and how a pixel's brightness becomes occupancy (`mode`, `negate`, thresholds).
+Cells are those of nav2_map_server 1.3.13 (Jazzy, `map_io.cpp`): the grey value is the luminance of
+the colours in 8 bits, thresholds belong to what they bound, transparency makes a cell unknown but
+in `raw`. A picture alone is a map, too, once somebody says how large its pixels are.
+
+What was written on another computer is read where it can be: a picture that is not where the file
+says is looked for beside it. `notes` says so, and which keys nobody knows.
 
 `OccupancyMap` keeps the picture's own rows and columns; `grid` is what the robot works on: cells
 along the axes of the world, also where the picture is turned.
@@ -13,13 +17,14 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +40,9 @@ from strict_files.files import FileError, in_one_line, like_file, replace_text
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import YamlFile, read_yaml_file
 
+if TYPE_CHECKING:
+    from PIL import Image
+
 PICTURES = ('.pgm', '.png', '.bmp', '.jpg', '.jpeg', '.tif', '.tiff', '.pbm', '.ppm', '.gif')
 """Endings of files that are taken for pictures."""
 MODES = ('trinary', 'scale', 'raw')
@@ -44,12 +52,15 @@ OCCUPIED_THRESHOLD, FREE_THRESHOLD = 0.65, 0.196
 """What is taken where a file names none, as ROS 1 writes them: 205 is unknown."""
 _NAV2_FREE, _SAVED_UNKNOWN = 0.25, 205
 """With this threshold nav2_map_saver writes a shade for "unknown" that map_server then reads as
-free (slam_toolbox issue 587). What was saved as unknown is taken as unknown.
+free (slam_toolbox issue 587): see `OccupancyMap.as_saved`.
 """
+_LUMINANCE = (306, 601, 117)
+"""Of red, green and blue, 1,024ths: GraphicsMagick's intensity (Rec. 601), as map_server has it."""
 _KEYS = (
     *('image', 'resolution', 'origin', 'mode', 'negate', 'occupied_thresh', 'free_thresh'),
     *('map_type', 'cost_translation_table'),
 )
+_MOST_LISTED = 5
 _FINEST, _COARSEST = 0.001, 5.0
 _FURTHEST = 100_000.0
 _PARALLEL = 1e-6
@@ -65,12 +76,26 @@ class OccupancyMap:
             0 free, 100 occupied, -1 unknown.
         resolution: Side of a pixel, metres.
         origin: Pose of the lower left corner in the world: x, y in metres, yaw in rad.
+        picture: The picture; None: it is made of something else.
+        notes: What a person should know of how it was read, a line each.
+        saved_unknown: The cells that are free by the file's threshold, but have the shade that
+            nav2_map_saver gives to unknown ones; None: none are.
     """
 
     path: Path
     cells: NDArray[np.int8]
     resolution: float
     origin: tuple[float, float, float]
+    picture: Path | None = None
+    notes: tuple[str, ...] = ()
+    saved_unknown: NDArray[np.bool_] | None = None
+
+    def as_saved(self) -> OccupancyMap:
+        """Return the map as the robot saved it: unknown where map_server reads free by mistake."""
+        if self.saved_unknown is None:
+            return self
+        cells = np.where(self.saved_unknown, np.int8(UNKNOWN), self.cells)
+        return replace(self, cells=cells, saved_unknown=None)
 
     @cached_property
     def grid(self) -> Grid:
@@ -156,18 +181,52 @@ def read_map(
     if resolution is not None or origin:
         raise FileError(f'{path}: says its own resolution and origin: expected them for a picture')
     file = read_yaml_file(path)
-    _check_keys(file)
+    notes = _checked_keys(file)
     image = file.values['image']
     if not isinstance(image, str) or not image:
         raise file.error(('image',), f'got {image!r}, expected the name of a picture')
-    picture = Path(image) if Path(image).is_absolute() else path.parent / image
     side = _number(file, 'resolution', file.values['resolution'], _FINEST, _COARSEST)
+    where, reading = _origin(file), _reading(file)
+    picture = _found_picture(file, image)
+    if picture != path.parent / image:
+        notes = (*notes, f'{path}: the picture {image} is not there: {picture} is taken')
     try:
-        return _made(path, picture, side, _origin(file), _reading(file))
+        return _made(path, picture, side, where, reading, notes)
     except FileError as error:
         if str(error).startswith(f'{picture}'):
             raise file.error_at(('image',), str(error)) from None
         raise
+
+
+def _found_picture(file: YamlFile, image: str) -> Path:
+    """Return the picture that a map's file means, where it is on this computer.
+
+    Raises:
+        FileError: Neither is it where the file says, nor is one of its name beside the file.
+    """
+    named = file.path.parent / image
+    name = image.replace('\\', '/').rstrip('/').rpartition('/')[2]
+    beside = file.path.parent / name
+    for tried in (named, Path(os.path.expanduser(image)), beside):
+        if tried.is_file():
+            return tried
+    there = _pictures_in(file.path.parent)
+    same = [each for each in there if each.stem.casefold() == beside.stem.casefold()]
+    if len(same) == 1:
+        return same[0]
+    if named.exists():
+        return named  # a folder or a device: reading it says so
+    listed = ', '.join(each.name for each in (same or there)[:_MOST_LISTED])
+    found = f'the pictures there are {listed}' if listed else 'there is no picture'
+    also = f', nor is {beside}' if beside != named else ''
+    raise file.error(('image',), f'{named}: no such file{also}; {found}: expected its name')
+
+
+def _pictures_in(folder: Path) -> list[Path]:
+    try:
+        return sorted(each for each in folder.iterdir() if is_picture(each) and each.is_file())
+    except OSError:
+        return []
 
 
 def is_picture(path: str | Path) -> bool:
@@ -235,13 +294,17 @@ class _Reading:
     free: float = FREE_THRESHOLD
 
 
-def _check_keys(file: YamlFile) -> None:
-    for key in file.values:
-        if key not in _KEYS:
-            raise file.error((str(key),), f'no key of a map, expected {nearest(str(key), _KEYS)}')
+def _checked_keys(file: YamlFile) -> tuple[str, ...]:
+    """Return a line that names the keys which nobody knows; map_server passes over them, too."""
     for key in ('image', 'resolution'):
         if key not in file.values:
             raise file.error((), f"a map in map_server's format needs '{key}'")
+    unknown = [str(key) for key in file.values if key not in _KEYS]
+    if not unknown:
+        return ()
+    like = [(key, name) for key in unknown for name in _KEYS if nearest(key, _KEYS) == f"'{name}'"]
+    meant = ''.join(f"; is '{name}' meant by '{key}'?" for key, name in like)
+    return (f'{file.path}: keys that no map has are ignored: {", ".join(unknown)}{meant}',)
 
 
 def _origin(file: YamlFile) -> tuple[float, ...]:
@@ -254,7 +317,7 @@ def _origin(file: YamlFile) -> tuple[float, ...]:
 def _reading(file: YamlFile) -> _Reading:
     given = file.values
     mode = given.get('mode', 'trinary')
-    if mode not in MODES:
+    if not isinstance(mode, str) or mode.lower() not in MODES:
         raise file.error(('mode',), f'got {mode!r}, expected {", ".join(MODES)}')
     negate = given.get('negate', 0)
     if negate not in (0, 1):  # also false and true
@@ -268,7 +331,7 @@ def _reading(file: YamlFile) -> _Reading:
         raise file.error(
             ('free_thresh',), f'{free:g}: expected at most occupied_thresh, {occupied:g}'
         )
-    return _Reading(mode, bool(negate), occupied, free)
+    return _Reading(mode.lower(), bool(negate), occupied, free)
 
 
 def _number(file: YamlFile, key: str, value: Any, low: float, high: float) -> float:
@@ -278,7 +341,12 @@ def _number(file: YamlFile, key: str, value: Any, low: float, high: float) -> fl
 
 
 def _made(
-    path: Path, picture: Path, resolution: float, origin: Sequence[float], reading: _Reading
+    path: Path,
+    picture: Path,
+    resolution: float,
+    origin: Sequence[float],
+    reading: _Reading,
+    notes: tuple[str, ...] = (),
 ) -> OccupancyMap:
     if not _FINEST <= resolution <= _COARSEST:
         raise FileError(
@@ -286,16 +354,18 @@ def _made(
         )
     if len(origin) != 3 or not all(abs(each) <= _FURTHEST for each in origin):
         raise FileError(f'{path}: an origin of {list(origin)}: expected [x, y, yaw]')
-    cells = _occupancy(*_pixels(picture), reading)
+    grey, alpha = _pixels(picture)
+    cells = _occupancy(grey, alpha, reading)
+    saved = None
+    if reading.mode == 'trinary' and reading.free == _NAV2_FREE:
+        unknown = (grey == _SAVED_UNKNOWN) & (cells == FREE)
+        saved = unknown if unknown.any() else None
     x, y, yaw = (float(each) for each in origin)
-    return OccupancyMap(path, cells, resolution, (x, y, yaw))
+    return OccupancyMap(path, cells, resolution, (x, y, yaw), picture, notes, saved)
 
 
-def _pixels(picture: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-    """Return a picture's brightness and, where it has one, opacity; 0 to 1, shape (rows, columns).
-
-    The brightness is the mean of the colours, as map_server takes it.
-    """
+def _pixels(picture: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]:
+    """Return a picture's luminance and, where it has one, opacity; 0 to 255, (rows, columns)."""
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -308,54 +378,115 @@ def _pixels(picture: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | N
                     f'{picture}: {opened.width} by {opened.height} pixels: expected at most '
                     f'{MOST_CELLS} in all'
                 )
-            image: Image.Image = opened
-            if image.mode == 'P':
-                image = image.convert('RGBA' if 'transparency' in image.info else 'RGB')
-            elif image.mode == '1':
-                image = image.convert('L')
-            values = np.asarray(image)
-            bands = image.getbands()
+            values = _channels(picture, opened)
     except FileNotFoundError as error:
         there = like_file(picture)
         hint = f", expected '{there}'" if there else ''
         raise FileError(f'{picture}: {error.strerror}{hint}') from None
-    except (UnidentifiedImageError, Image.DecompressionBombError) as error:
-        bomb = isinstance(error, Image.DecompressionBombError)
-        what = str(error) if bomb else 'no picture that can be read'
-        raise FileError(f'{picture}: {what}') from None
+    except UnidentifiedImageError:
+        raise FileError(f'{picture}: {_what_it_is(picture)}') from None
+    except Image.DecompressionBombError as error:
+        raise FileError(f'{picture}: {error}') from None
     except OSError as error:
         raise FileError(
             in_one_line(error) if error.errno else f'{picture}: a damaged picture: {error}'
         ) from None
     except (ValueError, SyntaxError, EOFError) as error:
         raise FileError(f'{picture}: a damaged picture: {error}') from None
-    whole = np.float32(65535 if bands[0].startswith('I') or values.dtype.itemsize > 1 else 255)
-    if values.ndim == 2:
-        return values.astype(np.float32) / whole, None
-    has_alpha = bands[-1] == 'A'
-    colours = values[..., :-1] if has_alpha else values
-    bright = colours.astype(np.float32).mean(axis=2) / whole
-    return bright, values[..., -1].astype(np.float32) / whole if has_alpha else None
+    alpha = _in_8_bits(values[..., -1]) if values.ndim == 3 and values.shape[2] in (2, 4) else None
+    if values.ndim == 2 or values.shape[2] < 3:
+        return _in_8_bits(values if values.ndim == 2 else values[..., 0]), alpha
+    weighted = np.zeros(values.shape[:2], np.uint32)
+    for channel, weight in enumerate(_LUMINANCE):
+        weighted += values[..., channel].astype(np.uint32) * np.uint32(weight)
+    # GraphicsMagick computes in 16 bits, where a sample of 8 bits stands twice.
+    in_16_bits = weighted if values.dtype == np.uint16 else weighted * np.uint32(257)
+    return _in_8_bits((in_16_bits >> 10).astype(np.uint16)), alpha
+
+
+def _in_8_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return samples of 16 bits, rounded; those of 8 bits as they are."""
+    if samples.dtype == np.uint8:
+        return samples
+    rounded: NDArray[np.uint8] = ((samples.astype(np.uint32) + 128) // 257).astype(np.uint8)
+    return rounded
+
+
+def _channels(picture: Path, image: Image.Image) -> NDArray[Any]:
+    """Return a picture's samples of 8 or 16 bits: grey, grey and alpha, colours (and alpha)."""
+    if image.format == 'PNG' and image.mode in ('RGB', 'RGBA', 'LA') and _has_16_bits(picture):
+        # Pillow keeps the upper half of each sample of these; map_server rounds.
+        import cv2
+
+        samples = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED)
+        if samples is not None and samples.dtype == np.uint16:
+            return np.asarray(samples[..., [2, 1, 0, *range(3, samples.shape[2])]])
+    if image.mode == 'P' or 'transparency' in image.info:
+        image = image.convert('RGBA' if 'transparency' in image.info else 'RGB')
+    elif image.mode == '1':
+        image = image.convert('L')
+    elif image.mode not in ('L', 'LA', 'RGB', 'RGBA', 'I', 'I;16', 'I;16B', 'I;16L', 'I;16N'):
+        image = image.convert('RGBA' if image.getbands()[-1] in ('A', 'a') else 'RGB')
+    values: NDArray[Any] = np.asarray(image)
+    if values.dtype.itemsize > 1:
+        return np.asarray(np.clip(values, 0, 65535), np.uint16)
+    return values
+
+
+def _has_16_bits(png: Path) -> bool:
+    with png.open('rb') as file:
+        return file.read(25)[24:] == b'\x10'  # behind the signature and the size, in IHDR
+
+
+_KINDS = (
+    (b'%PDF', 'a PDF'),
+    (b'PK', 'a zip archive'),
+    (b'\x1f\x8b', 'a gzip archive'),
+    (b'version https://git-lfs', "Git LFS's pointer to a picture, which `git lfs pull` fetches"),
+    (b'<svg', 'an SVG drawing'),
+    (b'<?xml', 'an XML text, such as an SVG drawing'),
+    (b'<!DOCTYPE', 'a web page'),
+    (b'<html', 'a web page'),
+)
+
+
+def _what_it_is(path: Path) -> str:
+    """Return what a file is that is no picture, in words."""
+    size = path.stat().st_size
+    if not size:
+        return 'an empty file: expected a picture'
+    with path.open('rb') as file:
+        start = file.read(200)
+    kinds = [said for begin, said in _KINDS if start.lstrip()[: len(begin)] == begin]
+    if not kinds and not start.strip(bytes([*range(32, 127), 9, 10, 13])):
+        kinds = ['a text']
+    what = kinds[0] if kinds else 'no picture that can be read'
+    return f'{what} ({size:,} bytes): expected a picture, such as PGM, PNG or BMP'
 
 
 def _occupancy(
-    bright: NDArray[np.float32], opacity: NDArray[np.float32] | None, reading: _Reading
+    grey: NDArray[np.uint8], alpha: NDArray[np.uint8] | None, reading: _Reading
 ) -> NDArray[np.int8]:
-    if opacity is not None and reading.mode == 'trinary':
-        # In this mode opacity is averaged in with red, green and blue.
-        bright = (3 * bright + opacity) / np.float32(4)
+    """Return the cells of a picture.
+
+    Each of the 256 grey values has one result, in single precision as map_server computes it.
+    """
+    shades = np.arange(256)
     if reading.mode == 'raw':
-        value = np.rint(bright * 255).astype(np.int16)
-        return np.where(value <= 100, value, UNKNOWN).astype(np.int8)
-    occupied = bright if reading.negate else np.float32(1) - bright
-    found = np.full(bright.shape, UNKNOWN, np.int8)
+        # As it is, whatever its opacity and whether it is to be negated.
+        return np.where(shades <= OCCUPIED, shades, UNKNOWN).astype(np.int8)[grey]
+    bright = shades.astype(np.float32) / np.float32(255)
+    value = bright if reading.negate else np.float32(1) - bright
+    low, high = np.float32(reading.free), np.float32(reading.occupied)
+    found = np.full(256, UNKNOWN, np.int8)
+    found[value >= high] = OCCUPIED
+    found[value <= low] = FREE
     if reading.mode == 'scale':
-        span = max(reading.occupied - reading.free, 1e-9)
-        found = np.rint(np.clip((occupied - reading.free) / span, 0.0, 1.0) * 100).astype(np.int8)
-    found[occupied > reading.occupied] = OCCUPIED
-    found[occupied < reading.free] = FREE
-    if reading.mode == 'trinary' and reading.free == _NAV2_FREE:
-        found[np.rint(bright * 255) == _SAVED_UNKNOWN] = UNKNOWN
-    if opacity is not None and reading.mode == 'scale':
-        found[opacity < 1] = UNKNOWN
-    return found
+        between = (value > low) & (value < high)
+        span = np.float32(reading.occupied - reading.free)
+        share = (value[between] - low) / span * np.float32(100)
+        found[between] = np.floor(share + np.float32(0.5)).astype(np.int8)
+    cells = found[grey]
+    if alpha is not None:
+        cells[alpha < 255] = UNKNOWN
+    return cells

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,6 @@ from floor_plans.occupancy_map import (
 from floor_plans.parameters import problem_in_name
 from floor_plans.writing import format_place
 from strict_files.files import FileError, in_one_line, read_file, replace_text
-from strict_files.yaml_file import read_yaml_file
 
 MOST_BYTES = 20_000_000
 """Of a YAML file; a picture may be larger."""
@@ -49,6 +48,7 @@ class ImportRequest:
         labels: Where to write the rooms as a picture; None: nowhere.
         force: Whether to write over a place that is there already.
         command: What a person typed, for the head of the place's file; empty: nothing.
+        kept: Files that are not written over, whatever was asked for.
     """
 
     source: Path
@@ -59,6 +59,7 @@ class ImportRequest:
     labels: Path | None = None
     force: bool = False
     command: str = ''
+    kept: tuple[Path, ...] = ()
 
     @property
     def place(self) -> Path:
@@ -91,13 +92,15 @@ def import_place(request: ImportRequest) -> list[str]:
         return _import_graph(request, levels or None)
     if request.level:
         raise ValueError(f'{source}: has no levels: expected no --level')
-    building = read_map(source, resolution=request.resolution)
+    building = read_map(source, resolution=request.resolution).as_saved()
     proposal = _proposed(request, building, {})
     beside = os.path.relpath(building.path.resolve(), out.resolve().parent)
     reference: dict[str, object] = {'map_file': beside}
     if is_picture(building.path):
         reference['map_file_resolution'] = building.resolution
-    return _written(request, proposal, reference, proposal.parameters, [])
+    if building.picture is not None:
+        request = replace(request, kept=(building.picture,))
+    return _written(request, proposal, reference, proposal.parameters, list(building.notes))
 
 
 def _is_free(path: Path, request: ImportRequest) -> None:
@@ -149,20 +152,11 @@ def _written(
         'a door is x, y, direction of the opening, width.'
     )
     picture = out.with_suffix('.png')
-    kept = {request.source, request.source.with_suffix('.png'), _picture_of(request.source)}
+    kept = {request.source, request.source.with_suffix('.png'), *request.kept}
     if picture.resolve() in {each.resolve() for each in kept}:
         picture = out.with_name(out.stem + '_drawn.png')
     text = format_place({**reference, **parameters}, title)
     return [f'{request.source}: {found}', *more, *lines, *_draw(request, text, picture)]
-
-
-def _picture_of(source: Path) -> Path:
-    """Return the picture that a map's description names; the source itself if it names none."""
-    try:
-        image = None if is_picture(source) else read_yaml_file(source).values.get('image')
-    except FileError:
-        return source  # a building or a graph
-    return source.parent / image if isinstance(image, str) else source
 
 
 def _draw(request: ImportRequest, text: str, picture: Path) -> list[str]:
