@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,6 +53,7 @@ from surveillance_operator.mission_state import (
     Pose,
     Status,
 )
+from surveillance_operator.recording.schemas import message_class
 from surveillance_runtime.conversions import map_from, points_from_cloud, pose_from, seconds_of
 from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.incident_topic import INCIDENTS_QOS, update_from
@@ -502,7 +502,6 @@ def topic_of(figure: Figure) -> Topic:
     """Return the topic that brings a figure; it has one of its own."""
     heard = figure.heard
     assert heard is not None
-    package, _, kind = heard.kind.split('/')
 
     def read(message: Any, old: MissionState) -> Fields:
         value = heard.value(message)
@@ -510,7 +509,7 @@ def topic_of(figure: Figure) -> Topic:
         return {'measured': known if value is None else {**known, figure.name: value}}
 
     # Whoever publishes it, a driver mostly, is heard with this quality.
-    return Topic(heard.topic, getattr(import_module(f'{package}.msg'), kind), read, _STREAM)
+    return Topic(heard.topic, message_class(heard.kind), read, _STREAM)
 
 
 def _on_scan_goals(message: GoalStatusArray, _: MissionState) -> Fields:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -13,13 +11,13 @@ from contextlib import suppress
 import pytest
 import rclpy
 
-from launcher.package_commands import HELP, all_helps
 from launcher.reference_tables import parameters_page, survey
 from surveillance_runtime.configuration import SCHEMA, read_schema
 from surveillance_runtime.discovery import LAST_DOMAIN
 from tests.launcher.conftest import ROOT
 
 pytestmark = pytest.mark.early
+
 
 SURVEY = """
 import json, sys
@@ -74,26 +72,3 @@ def test_params_prints_each_value_with_its_source():
     assert lines['execution_mode'].endswith('"RANDOM"  (--mode RANDOM)')
     assert 'config/parameters.yaml:' in lines['random_battery_time']
     assert lines['console'].rstrip().endswith(')')
-
-
-def test_the_helps_of_the_packages_commands_are_theirs():
-    def said(helps):
-        # From Python 3.13 on `-o PNG, --output PNG` is `-o, --output PNG`.
-        texts = {name: re.sub(r'(-\w) [A-Z]+, --', r'\1, --', text) for name, text in helps.items()}
-        return {name: text.split() for name, text in texts.items()}
-
-    hint = 'write them anew: python3 launch.py params --write'
-    assert said(json.loads(HELP.read_text())) == said(all_helps()), hint
-
-
-def test_every_help_is_said_soon_and_needs_no_set_up(tmp_path):
-    # A copy without an environment, and without the packages that need one.
-    for part in ('launcher', 'surveillance_runtime', 'libs/strict_files'):
-        shutil.copytree(ROOT / part, tmp_path / part)
-    shutil.copyfile(ROOT / 'launch.py', tmp_path / 'launch.py')
-    for command in ('', 'run', 'node', 'list', 'params', 'service', 'setup', 'test', 'lint', 'map'):
-        words = [sys.executable, '-S', 'launch.py', *command.split(), '--help']
-        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60.0)
-        assert (done.returncode, done.stderr) == (0, '')
-        assert 'usage:' in done.stdout
-    assert not (tmp_path / '.venv').exists()

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import signal
+from dataclasses import replace
 
 import pytest
 
+from launcher.cli import CONFIG
+from launcher.run import (
+    Run,
+)
+from launcher.run_configuration import configuration
 from launcher.run_folder import (
     RunState,
     find,
     latest,
     look_into,
     make_folder,
+    options_of,
     prune,
+    resumed,
+    run_from,
 )
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.run_files import STATE, in_order
+from surveillance_runtime.run_parameters import write_parameters
 
 HOLD = (
     'import sys, signal; from pathlib import Path; from launcher.run_folder import RunState\n'
@@ -145,3 +156,26 @@ def test_the_run_that_is_gone_on_with_stays_though_it_is_the_oldest(tmp_path, mo
 def test_a_state_nested_too_deep_holds_no_run(tmp_path):
     (tmp_path / STATE).write_text('[' * 200_000)
     assert look_into(tmp_path) is None
+
+
+def test_a_run_folder_on_a_full_disk_is_named(tmp_path):
+    (tmp_path / 'armor_server.yaml').symlink_to('/dev/full')
+    run = Run()
+    with pytest.raises(OSError, match=r'cannot be written: No space left.*armor_server.yaml'):
+        write_parameters(tmp_path, None, configuration(CONFIG, run), run.nodes())
+
+
+def test_options_of_a_run_survive_its_launcher(tmp_path):
+    files = {name: tmp_path / name for name in ('place', 'parameters', 'notify', 'watch', 'stage')}
+    run = replace(Run(mode='RANDOM', assignments=['a:=1'], only=['reasoner']), **files)
+    stored = json.loads(json.dumps(options_of(run)))
+    assert run_from(stored) == replace(run, without=[], remaps=[])
+    with pytest.raises(ValueError, match='--resume'):
+        run_from({'mode': 'RANDOM', 'place': None, 'seconds': None} | {'place': 7})
+
+
+def test_a_resumed_run_keeps_what_is_not_given_anew(tmp_path):
+    folder = make_folder(tmp_path)
+    RunState(folder, options_of(Run(mode='RANDOM', namespace='robot1'))).end()
+    run, found = resumed(Run(namespace='robot2'), Run(), tmp_path, '')
+    assert (run.mode, run.namespace, found) == ('RANDOM', 'robot2', folder)

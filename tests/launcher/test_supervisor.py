@@ -10,19 +10,31 @@ from pathlib import Path
 import pytest
 
 from launcher.supervisor import EXIT_CUT, STOP_AGAIN_AFTER, STOP_WITHIN, describe_exit
-from tests.launcher.conftest import ROOT, USER_ENVIRON, gone
+from tests.launcher.conftest import USER_ENVIRON, gone
 
 DRIVER = str(Path(__file__).with_name('supervised.py'))
+
+
 PATIENT = {**USER_ENVIRON, 'STOP_AT_MOST': '240'}
+
+
 """Where nothing is killed for want of time, however busy the machine is."""
+
+
 WAIT = 'import signal; print("up", flush=True); signal.pause()'
+
+
 STUBBORN = (
     'import signal\n'
     'for s in (signal.SIGTERM, signal.SIGINT): signal.signal(s, signal.SIG_IGN)\n'
     'print("up", flush=True)\n'
     'while True: signal.pause()'
 )
+
+
 FINISHED = 'import os; os.write(int(os.environ["LAUNCH_HEARTBEAT"]), b"F")'
+
+
 PARENT = (
     'import subprocess, sys, signal\n'
     'child = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"])\n'
@@ -294,33 +306,6 @@ def test_a_reader_that_goes_away_ends_the_launch():
         launch.stdout.close()
         assert launch.wait(60.0) == 0
     assert gone([int(match[1])], 0)
-
-
-def test_children_end_with_a_launcher_that_is_killed(start):
-    child = str(ROOT / 'launcher' / 'node_process.py')
-    script = (
-        'import os, subprocess, sys\n'
-        f'subprocess.run([sys.executable, "-P", {child!r}, str(os.getpid()), '
-        '"x=tests.launcher.waiting_node:X", "--ros-args"])'
-    )
-    launch = start('-c', script)
-    launch.until('up with --ros-args')
-    children = Path(f'/proc/{launch.process.pid}/task/{launch.process.pid}/children')
-    pids = [int(pid) for pid in children.read_text().split()]
-    assert len(pids) == 1
-    launch.end(signal.SIGKILL)
-    assert gone(pids)
-
-
-def test_a_child_whose_launcher_is_gone_already_does_not_start():
-    child = str(ROOT / 'launcher' / 'node_process.py')
-    done = subprocess.run(
-        [sys.executable, '-P', child, '1', 'x=tests.launcher.waiting_node:X'],
-        env=USER_ENVIRON,
-        timeout=60.0,
-        check=False,
-    )
-    assert done.returncode == 1
 
 
 def test_exit_codes_in_words():

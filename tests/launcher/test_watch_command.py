@@ -10,7 +10,7 @@ import termios
 import pytest
 
 from surveillance_operator.watch_command import main
-from tests.launcher.test_terminal import Terminal
+from tests.launcher.test_console import Terminal
 
 SHOW_CURSOR, FIRST_SCREEN = b'\x1b[?25h', b'\x1b[?1049l'
 COMMAND = ['-m', 'surveillance_operator.watch_command']
