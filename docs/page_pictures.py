@@ -34,7 +34,9 @@ def page(behaviour: str, speed: float) -> Iterator[Viewer]:
         words += ['--web-address', '127.0.0.1:0', '-p', 'use_sim_time:=true']
         started = Started([*words, '-p', f'simulator:speed:={speed}'])
         try:
-            viewer = Viewer(started.until(r'the mission is shown at (\S+)', timeout=WAIT)[1])
+            told = r'the mission is shown at (\S+) \(its token is in ([^)]+)\)'
+            shown = started.until(told, timeout=WAIT)
+            viewer = Viewer(f'{shown[1]}?token={Path(shown[2]).read_text().strip()}')
             try:
                 yield viewer
             finally:

@@ -15,6 +15,8 @@ from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from typing import TextIO
 
+from surveillance_runtime.launch_protocol import FOR_THE_TERMINAL
+
 _FIELD = '\x1f'
 """Stands between the fields of a line that a node logs: no text of a node holds it."""
 ROS_FORMAT = _FIELD.join(('', '{severity}', '{name}', '{message}'))
@@ -75,6 +77,10 @@ class MergedLog:
         """Print a line that `process` printed."""
         # A progress bar redraws its line: only what it ended with belongs into a log.
         text = raw.rstrip('\r\n\t ').rsplit('\r', 1)[-1]
+        if text.startswith(FOR_THE_TERMINAL):
+            if self._terminal:
+                self._show(bounded(text.removeprefix(FOR_THE_TERMINAL)))
+            return
         if text.startswith(_FIELD) and text.count(_FIELD) >= 3:
             _, severity, origin, message = text.split(_FIELD, 3)
             severity, origin, message = map(bounded, (severity, origin, message))
@@ -135,6 +141,9 @@ class MergedLog:
     def _emit(self, shown: str, plain: str) -> None:
         if self._file is not None:
             self._file.write(plain)
+        self._show(shown)
+
+    def _show(self, shown: str) -> None:
         if self.broken:
             return
         stream = self._stream or sys.stdout

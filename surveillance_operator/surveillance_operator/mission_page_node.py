@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import os
 import secrets
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -39,7 +40,8 @@ from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.sightings import Sightings
 from surveillance_runtime import parameter_checks
-from surveillance_runtime.launch_protocol import NotNowError
+from surveillance_runtime.launch_protocol import FOR_THE_TERMINAL, HEARTBEAT, NotNowError
+from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
 from surveillance_runtime.process import run_node
@@ -96,7 +98,7 @@ class MissionPage(PatrolNode):
         token_file = self.parameter(
             'token_file',
             '',
-            'File with the token, made if missing; empty: a new one.',
+            'File with the token, made if missing; empty: a new one among the temporary files.',
             read_only=True,
         )
         evidence_folder = self.parameter(
@@ -115,6 +117,8 @@ class MissionPage(PatrolNode):
         )
         self._actions = FleetActions(self, lambda: self._subscriber.robots)
         session = self._session(files) if control and files.place_file else None
+        self._own_token_file = '' if token_file else _temporary_token_file()
+        token_file = token_file or self._own_token_file
         try:
             self.page = Page(
                 self._broadcaster,
@@ -135,13 +139,19 @@ class MissionPage(PatrolNode):
             raise NotNowError(str(error)) from error
         self._broadcaster.show(self._subscriber.state(''))
         self.page.start()
-        self.get_logger().info(f'the mission is shown at {self.page.address}')
+        # The token is in no log and on no topic: they are recorded, and read by others.
+        where = f' (its token is in {token_file})' if self.page.needs_token else ''
+        self.get_logger().info(f'the mission is shown at {self.page.open_address}{where}')
+        if self.page.needs_token and HEARTBEAT in os.environ:
+            print_lines(f'{FOR_THE_TERMINAL}with its token: {self.page.address}')
         self.spawn(self._tick, 'page')
 
     def on_stop(self) -> None:
         """End the server, if there is one: its port may be taken."""
         if hasattr(self, 'page'):
             self.page.stop()
+        if self._own_token_file:
+            Path(self._own_token_file).unlink(missing_ok=True)
 
     def _period(self) -> float:
         return POLL_PERIOD if self._broadcaster.viewers else IDLE_PERIOD
@@ -273,14 +283,20 @@ class RoomChanges:
         return f'{said}; also in the file: the editor can undo it'
 
 
+def _temporary_token_file() -> str:
+    """Return the name of a new file that its owner alone reads, with a token in it."""
+    descriptor, path = tempfile.mkstemp(prefix='mission_page_token_')
+    with open(descriptor, 'w', encoding='ascii') as file:
+        file.write(secrets.token_urlsafe(24) + '\n')
+    return path
+
+
 def _kept_token(path: str) -> str:
     """Return the token in a file that its owner alone reads, so that it outlives the process.
 
     Raises:
         OSError: The file cannot be read or made; the error has its name.
     """
-    if not path:
-        return ''
     with suppress(FileExistsError):
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
         with open(descriptor, 'w', encoding='ascii') as file:

@@ -634,7 +634,7 @@ def of_mission(entries: Iterable[RecordEntry]) -> Iterator[RecordEntry]:
     return (entry for entry in entries if entry.kind.is_of_mission)
 
 
-class Gap(NamedTuple):
+class MissingTime(NamedTuple):
     """A time of which something is missing in a log.
 
     Attributes:
@@ -645,24 +645,24 @@ class Gap(NamedTuple):
     end: float
 
 
-def gaps(entries: Iterable[RecordEntry]) -> list[Gap]:
+def gaps(entries: Iterable[RecordEntry]) -> list[MissingTime]:
     """Return the times of which something is missing, since the disk was full."""
-    found: list[Gap] = []
+    found: list[MissingTime] = []
     begun: RecordEntry | None = None
     for entry in entries:
         is_end = entry.name == 'gap' and entry.text('phase') == 'end'
         if is_end and begun is not None:
             if entry.fields.get('lost'):
-                found.append(Gap(begun.time, entry.time))
+                found.append(MissingTime(begun.time, entry.time))
             begun = None
         elif entry.name == 'gap':
             begun = entry
         elif entry.name == 'start' and begun is not None:
             # Whoever wrote it ended before there was space.
-            found.append(Gap(begun.time, entry.time))
+            found.append(MissingTime(begun.time, entry.time))
             begun = None
     if begun is not None:
-        found.append(Gap(begun.time, entry.time))
+        found.append(MissingTime(begun.time, entry.time))
     return found
 
 

@@ -24,6 +24,9 @@ read it when they are loaded, before a process can say so itself."""
 LAUNCH, AGE = 'launch', 'launch_s'
 """Under these names a node tells on `/diagnostics` of which launch it is, and how old that is."""
 
+FOR_THE_TERMINAL = '\x1e'
+"""Begins a line that a process prints for the person at the terminal alone: it stands in no log."""
+
 UP = b'U'
 """The bulk of its start is done."""
 BEAT = b'.'

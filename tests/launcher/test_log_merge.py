@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from launcher.log_merge import LONGEST_LINE, ROS_FORMAT, LogFile, MergedLog, bounded
+from surveillance_runtime.launch_protocol import FOR_THE_TERMINAL
 
 
 @pytest.fixture
@@ -131,3 +132,15 @@ def test_a_line_is_bounded_and_holds_no_control_characters():
     assert bounded('plain \x1b[31mred\x1b[0m') == 'plain \x1b[31mred\x1b[0m'
     assert bounded('a\x00b\x07c') == r'a\x00b\x07c'
     assert len(bounded('x' * 10**6)) < LONGEST_LINE + 60
+
+
+@pytest.mark.parametrize('is_terminal', [True, False])
+def test_what_is_for_the_terminal_is_in_no_log(tmp_path, is_terminal):
+    stream = io.StringIO()
+    stream.isatty = lambda: is_terminal
+    log = MergedLog(stream, ['one'], path=tmp_path / 'log')
+    log.line('one', f'{FOR_THE_TERMINAL}with its token: http://127.0.0.1:8080/?token=secret')
+    log.say('the end')
+    log.close()
+    assert ('secret' in stream.getvalue()) == is_terminal
+    assert 'secret' not in (tmp_path / 'log').read_text()

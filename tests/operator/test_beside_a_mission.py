@@ -129,8 +129,8 @@ def test_watch_fits_eighty_columns_and_its_keys_change_it(mission: Started, term
 def viewer(mission: Started) -> Iterator[Viewer]:
     if not (CHROMIUM and DRIVER):
         pytest.skip(MISSING)
-    address = mission.until(r'the mission is shown at (\S+)')[1]
-    viewer = Viewer(address)
+    shown = mission.until(r'the mission is shown at (\S+) \(its token is in ([^)]+)\)')
+    viewer = Viewer(f'{shown[1]}?token={Path(shown[2]).read_text().strip()}')
     viewer.until(lambda: viewer.count('[data-place]') == 7)
     yield viewer
     viewer.close()

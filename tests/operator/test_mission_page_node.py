@@ -10,7 +10,7 @@ import pytest
 
 from floor_plans import read_place
 from floor_plans.editor import PlaceEditor
-from surveillance_operator.mission_page_node import RoomChanges
+from surveillance_operator.mission_page_node import MissionPage, RoomChanges
 from surveillance_operator.place_page.edit_session import EditSession
 
 SEVEN = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
@@ -104,3 +104,17 @@ def test_a_room_of_this_run_alone_is_said_to_be_so(session: EditSession) -> None
     assert rooms.add('R9', 1.0, 2.0, ['D1']) == 'R9 added'
     rooms, _ = changes(session)
     assert 'for this run' in rooms.add('R9', 1.0, 2.0, ['D1'])
+
+
+def test_the_token_is_in_no_log_and_on_no_topic(graph: Any, tmp_path: Path) -> None:
+    said = graph.said()
+    token_file = tmp_path / 'token'
+    parameters = {'port': 0, 'control': True, 'token_file': str(token_file)}
+    node = graph.add(MissionPage, parameters=parameters)
+    graph.until(lambda: any('the mission is shown at' in line for line in said))
+    (line,) = (each for each in said if 'the mission is shown at' in each)
+    assert line.endswith(f'{node.page.open_address} (its token is in {token_file})')
+    token = token_file.read_text().strip()
+    assert node.page.address.endswith(f'?token={token}')
+    assert not any(token in each for each in said)
+    assert token_file.stat().st_mode & 0o077 == 0

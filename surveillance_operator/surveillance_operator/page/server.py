@@ -157,15 +157,24 @@ class Page:
         self._stop_threads: CapacityLimiter | None = None
 
     @property
+    def needs_token(self) -> bool:
+        """Whether some of what it offers needs the token."""
+        return not self._is_local or bool(self._actions and not self._replay)
+
+    @property
     def address(self) -> str:
-        """Where to look; with the token where one is needed."""
+        """Where to look; with the token where one is needed: it is for no log."""
+        return self.open_address + (f'?token={self.token}' if self.needs_token else '')
+
+    @property
+    def open_address(self) -> str:
+        """Where to look, without the token."""
         if self._origin:
-            return f'{self._origin}/?token={self.token}'
+            return f'{self._origin}/'
         shown = f'[{self._host}]' if ':' in self._host else self._host
         if self._host in ('0.0.0.0', '::'):
             shown = socket.gethostname()
-        needs = not self._is_local or (self._actions and not self._replay)
-        return f'http://{shown}:{self.port}/' + (f'?token={self.token}' if needs else '')
+        return f'http://{shown}:{self.port}/'
 
     def start(self) -> None:
         """Serve on a thread of its own."""
