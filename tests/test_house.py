@@ -25,7 +25,6 @@ DOUBLE_NAMES: dict[str, str] = {
     'Backlog': '',
     'Kind': '',
     'Looking': '',
-    'MissionState': '',
     'Progress': '',
     'Reasoner': '',
     'Sighting': '',

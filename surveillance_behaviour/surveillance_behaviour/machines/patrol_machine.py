@@ -18,7 +18,7 @@ from patrol_policy.decision import RECHARGE
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
-    MissionState,
+    MachineState,
     Recover,
     WaitForHelp,
     add,
@@ -34,7 +34,7 @@ from surveillance_behaviour.ports import Point, Routine
 BATTERY_LOW = 'battery_low'
 
 
-class Initial(MissionState):
+class Initial(MachineState):
     """Has the robot look around and build its ontology.
 
     Args:
@@ -58,7 +58,7 @@ class Initial(MissionState):
         return 'look_on' if self._looks and goes_on and not mission.battery.low else 'start'
 
 
-class Reasoning(MissionState):
+class Reasoning(MachineState):
     """Asks for the next place, unless the battery has to be charged first."""
 
     task = 'reasoning'
@@ -77,7 +77,7 @@ class Reasoning(MissionState):
         return BATTERY_LOW
 
 
-class MoveStep(MissionState):
+class MoveStep(MachineState):
     """One of the two steps of a move; whether a low battery ends it depends on where it goes.
 
     Args:
@@ -135,7 +135,7 @@ def follow_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
     mission.arrived(ud.target, distance, ud.via_points)
 
 
-class Looking(MissionState):
+class Looking(MachineState):
     """Looks at the place, then again at what made an alert that is not sure; with an observer."""
 
     task = 'looking'
@@ -158,7 +158,7 @@ class Looking(MissionState):
         return BATTERY_LOW
 
 
-class GoBack(MissionState):
+class GoBack(MachineState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
@@ -192,7 +192,7 @@ def drive(
     return follow(mission, target, via_points, control, 'motion/controller', interrupt)
 
 
-class Recharge(MissionState):
+class Recharge(MachineState):
     """Charges the battery if the robot is at the dock, else chooses the dock to go to."""
 
     task = 'recharging'

@@ -18,7 +18,7 @@ PREEMPTED = 'preempted'
 FAILED = 'failed'
 
 
-class MissionState(fsm.State):
+class MachineState(fsm.State):
     """A state that knows the mission; a preempt that comes before its work ends it.
 
     One that talks to peers has the outcome `FAILED`, and ends with it when one of them fails.
@@ -76,7 +76,7 @@ class MissionState(fsm.State):
         return None
 
 
-class Recover(MissionState):
+class Recover(MachineState):
     """Looks at the last failure and chooses the next step."""
 
     def __init__(self, mission: Mission, *, steps: Iterable[Step] = tuple(Step)) -> None:
@@ -128,7 +128,7 @@ def _what_helps(failure: Failure | None, place: str) -> str:
     return 'open a door or remove the obstacle'
 
 
-class WaitForHelp(MissionState):
+class WaitForHelp(MachineState):
     """Says what is wrong and waits; then everything is tried anew, with longer pauses each time.
 
     The return of a peer that was away ends the pause; where none was away, a way that has opened

@@ -13,7 +13,7 @@ from state_machines.exceptions import CallInterruptedError
 from surveillance_behaviour.machines.shared_states import (
     FAILED,
     PREEMPTED,
-    MissionState,
+    MachineState,
     Recover,
     WaitForHelp,
     add,
@@ -27,7 +27,7 @@ from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.ports import Point
 
 
-class Initialization(MissionState):
+class Initialization(MachineState):
     """Waits until the ontology holds the map, and sets the robot's parameters."""
 
     task = 'initialization'
@@ -39,7 +39,7 @@ class Initialization(MissionState):
         return 'initialized'
 
 
-class ChooseRoomTask(MissionState):
+class ChooseRoomTask(MachineState):
     """Charge if the battery asks for it and the robot is at a station, else explore."""
 
     ends = ('recharge', 'explore')
@@ -52,7 +52,7 @@ class ChooseRoomTask(MissionState):
         return 'recharge' if must_charge else 'explore'
 
 
-class ExploreTask(MissionState):
+class ExploreTask(MachineState):
     """Looks around for a while; a battery that gets low ends it.
 
     Where somebody watches the robot looks at the place, and again at alerts that are not sure.
@@ -87,7 +87,7 @@ class ExploreTask(MissionState):
         return True
 
 
-class VerifyTask(MissionState):
+class VerifyTask(MachineState):
     """Looks again, from elsewhere, at what made an alert that is not sure."""
 
     ends = ('verified',)
@@ -107,7 +107,7 @@ class VerifyTask(MissionState):
         return 'verified'
 
 
-class RechargeTask(MissionState):
+class RechargeTask(MachineState):
     """Waits at the station until the battery is charged enough."""
 
     task = 'recharging'
@@ -125,7 +125,7 @@ class RechargeTask(MissionState):
         return self.mission.place
 
 
-class ChooseNextRoom(MissionState):
+class ChooseNextRoom(MachineState):
     """Charging place if the battery asks for it, else rules and policy."""
 
     task = 'choosing the next room'
@@ -137,7 +137,7 @@ class ChooseNextRoom(MissionState):
         return 'chosen'
 
 
-class MoveToNextRoom(MissionState):
+class MoveToNextRoom(MachineState):
     """Moves to the next room."""
 
     task = 'moving'
@@ -153,7 +153,7 @@ class MoveToNextRoom(MissionState):
         return str(ud.next_room)
 
 
-class ReturnToLastPlace(MissionState):
+class ReturnToLastPlace(MachineState):
     """Goes back to the last place the robot is known to have been in."""
 
     task = 'going back'
@@ -267,7 +267,7 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
     return machine
 
 
-class ReDock(MissionState):
+class ReDock(MachineState):
     """Drives to the station again when the battery does not rise there."""
 
     ends = ('again', 'give_up')
