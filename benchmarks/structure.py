@@ -398,8 +398,8 @@ def past_the_face(trees: Mapping[str, ast.Module], modules: Mapping[str, Path]) 
 def named_tests(modules: Mapping[str, Path]) -> tuple[set[str], set[str]]:
     """Return the modules that can have a test file, and those without one of their name.
 
-    A module's tests are `test_<module>.py`, or without its `_node`, in the tests of its library,
-    or anywhere below `tests/`.
+    A module's tests are `test_<module>.py`, or without its `_node`, anywhere below `tests/`; a
+    library's in its own tests, or where they need ROS in `tests/<library>`.
     """
     some = next(iter(modules.values()))
     checkout = next(
@@ -411,10 +411,16 @@ def named_tests(modules: Mapping[str, Path]) -> tuple[set[str], set[str]]:
     lacking = set()
     for name in testable:
         path = modules[name].relative_to(checkout)
-        below = Path(*path.parts[:2], 'tests') if path.parts[0] == 'libs' else Path('tests')
+        below = [Path('tests')]
+        if path.parts[0] == 'libs':
+            below = [Path(*path.parts[:2], 'tests'), Path('tests', path.parts[1])]
         stem = path.stem
         names = {f'test_{stem}.py', f'test_{stem.removesuffix("_node")}.py'}
-        if not any(each.name in names for each in (checkout / below).rglob('test_*.py')):
+        if not any(
+            each.name in names
+            for folder in below
+            for each in (checkout / folder).rglob('test_*.py')
+        ):
             lacking.add(name)
     return testable, lacking
 

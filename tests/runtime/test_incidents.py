@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from surveillance_runtime.incidents import (
@@ -31,7 +33,7 @@ def alarm(
     over: bool = False,
     node: str = 'robot_behavior',
     severity: Severity = Severity.ALARM,
-    **more: str,
+    **more: Any,
 ) -> IncidentUpdate:
     phase = IncidentPhase.END if over else IncidentPhase.BEGIN
     return IncidentUpdate(phase, cause, severity, text, node=node, **more)

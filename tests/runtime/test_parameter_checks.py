@@ -1,4 +1,4 @@
-"""What lists, texts and command lines have to hold: both sides of each bound, word by word."""
+"""What lists and texts have to hold: both sides of each bound, word by word."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from strict_files.suggestions import like, nearest
-from surveillance_runtime import parameter_checks, run_options
-from surveillance_runtime.command_line import CommandParser, page_address
+from surveillance_runtime import parameter_checks
+from surveillance_runtime.command_line import page_address
 
 POSE = 'three numbers: x, y, yaw'
 MOUNTS = 'x, y, yaw and roll of each lidar; roll 0, or 3.1416 for one that hangs upside down'
@@ -86,36 +86,6 @@ def test_what_is_no_address_is_told_with_an_example(text: str) -> None:
     assert str(found.value) == f'--web-address {text!r}: expected HOST:PORT like 0.0.0.0:8080'
 
 
-@pytest.mark.parametrize(
-    ('words', 'said'),
-    [
-        (['--speeed', '3'], "unknown option '--speeed': expected '--speed'"),
-        (['--speeed=3'], "unknown option '--speeed': expected '--speed'"),
-        (['fast'], "unexpected word 'fast'"),
-        (
-            ['--web', '0.0.0.0:80'],
-            "unexpected word '0.0.0.0:80': --web takes no value, expected --web-address 0.0.0.0:80",
-        ),
-        (['--quiet', 'x'], "unexpected word 'x'"),
-        (['--speed'], 'argument --speed: expected one argument'),
-    ],
-)
-def test_a_line_that_is_not_understood_costs_one_line(
-    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    parser = CommandParser(prog='launch.py drive')
-    parser.add_argument('--speed')
-    parser.add_argument('--web', action='store_true')
-    parser.add_argument('--web-control', action='store_true')
-    parser.add_argument('--web-address')
-    parser.add_argument('--quiet', action='store_true')
-    assert parser.parse_args(['--speed', '3', '--web']).speed == '3'
-    with pytest.raises(SystemExit) as ended:
-        parser.parse_args(words)
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == f'drive: {said} (see launch.py drive --help)\n'
-
-
 def test_a_name_is_like_another_by_its_letters_its_words_and_its_beginning() -> None:
     known = ['robot_speed', 'KITCHEN', 'max-range']
     assert like('--Kitchn', known) == 'KITCHEN'
@@ -130,9 +100,3 @@ def test_a_name_is_like_another_by_its_letters_its_words_and_its_beginning() -> 
     sixteen = [f'n{i}' for i in range(16)]
     assert nearest('zzz', sixteen).endswith(', n15')
     assert nearest('zzz', [*sixteen, 'n16']).endswith(', n15 and 1 more')
-
-
-def test_a_run_without_a_simulator_leaves_it_out() -> None:
-    assert run_options.left_out('none', ['reasoner']) == ('reasoner', 'simulator')
-    assert run_options.left_out('kinematic', ['reasoner']) == ('reasoner',)
-    assert run_options.left_out('mujoco', []) == ()

@@ -5,8 +5,6 @@ from __future__ import annotations
 import sys
 import threading
 
-import pytest
-
 import state_machines as fsm
 from state_machines import transitions as feeds
 from state_machines.program import unfold
@@ -266,74 +264,6 @@ def test_the_end_of_an_iterators_items_is_told_by_its_outcome():
         assert each.execute() == 'all'
     assert watched.transitions[-1] == ('Iterator', 'DO', 'all', 'all')
     watched.assert_covered()
-
-
-# The test kit.
-
-
-def test_scripted_outcomes_take_the_place_of_the_work():
-    machine = patrol()
-    script(machine, {'PATROL/CHOOSE': ['go', 'done'], 'PATROL/MOVE/PLAN': ['done']})
-    with watching(machine) as watched:
-        machine.execute()
-    watched.assert_path('CHOOSE', 'MOVE', 'CHOOSE')
-    watched.assert_path('PLAN', 'FOLLOW', container='PATROL/MOVE')
-    with pytest.raises(AssertionError, match='they agree in the first 1'):
-        watched.assert_path('CHOOSE', 'CHOOSE')
-    assert watched.untaken() == [('PATROL', 'MOVE', 'preempted')]
-    watched.assert_covered(except_for=watched.untaken())
-
-
-def test_coverage_names_the_transitions_that_were_not_taken():
-    machine = patrol()
-    script(machine, {'PATROL/CHOOSE': ['done']})
-    with watching(machine) as watched:
-        machine.execute()
-    assert ('PATROL', 'MOVE', 'preempted') in watched.untaken()
-    with pytest.raises(AssertionError, match="PATROL/MOVE/PLAN : 'done'"):
-        watched.assert_covered(except_for=[('PATROL', 'MOVE', 'preempted')])
-    assert 0.0 < watched.coverage() < 0.5
-
-
-@pytest.mark.parametrize(
-    ('outcomes', 'error'),
-    [
-        ({'PATROL/NIX': ['done']}, KeyError),
-        ({'OTHER/CHOOSE': ['done']}, KeyError),
-        ({'PATROL/MOVE': ['done']}, fsm.InvalidStateError),
-        ({'PATROL/CHOOSE': ['nix']}, fsm.InvalidTransitionError),
-    ],
-)
-def test_a_script_is_held_to_the_machine(outcomes, error):
-    with pytest.raises(error):
-        script(patrol(), outcomes)
-
-
-def test_a_script_that_runs_out_says_so():
-    machine = patrol()
-    script(machine, {'PATROL/CHOOSE': ['go']})
-    with pytest.raises(fsm.InvalidUserCodeError, match='more often than it has scripted outcomes'):
-        machine.execute()
-
-
-def test_a_fake_clock_wakes_whom_it_should():
-    clock, ends = FakeClock(), []
-    stop = fsm.Interrupt()
-    threads = [
-        threading.Thread(target=lambda s=s: ends.append((s, clock.sleep(s, stop))))
-        for s in (1.0, 2.0)
-    ]
-    for thread in threads:
-        thread.start()
-    clock.until_sleeping(2)
-    clock.advance(1.5)
-    threads[0].join(60.0)
-    assert ends == [(1.0, True)]
-    stop.set()
-    threads[1].join(60.0)
-    assert ends == [(1.0, True), (2.0, False)]
-    with pytest.raises(AssertionError, match='0 threads sleep'):
-        clock.until_sleeping(1, timeout=0.01)
 
 
 def test_a_transition_says_how_long_each_state_took_by_the_machines_clock():
