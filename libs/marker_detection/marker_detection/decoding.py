@@ -99,6 +99,8 @@ class MarkerReader:
         before, after = (
             self.fit.agreement(pyramid, each, cells.entries, blur) for each in (homographies, moved)
         )
+        # Gauss-Newton steps may also lead away (Baker and Matthews, "Lucas-Kanade 20 Years On",
+        # IJCV 56(3), 2004): what agrees less is not taken
         better = after >= before
         small = cell_widths(homographies, self.codes.side) < _SMALL_CELL
         if small.any():
@@ -136,6 +138,8 @@ class MarkerReader:
             return None
         homographies, entries = homographies[likely], entries[likely]
         correlation, blur = correlation[likely], blur[likely]
+        # before it is aligned, the right code may come second: all that leave nearly as little of
+        # the image unexplained are aligned, each by itself
         unexplained = 1.0 - np.square(np.maximum(correlation[:, :_HYPOTHESES], 0.0))
         close = unexplained < _HYPOTHESIS_RATIO * unexplained[:, :1] + 1e-6
         owner, column = np.nonzero(close)
@@ -146,6 +150,7 @@ class MarkerReader:
             self._rough, pyramid, aligned, blur[owner], None
         )
         inner = self._rough.inner_correlations(patches, entries[:, :1], footprint)
+        # of each candidate the hypothesis that agrees best: the first of its owner in this order
         rank = np.lexsort((-correlation[:, 0], owner))
         best = rank[np.flatnonzero(np.diff(owner[rank], prepend=-1))]
         best = best[correlation[best, 0] > _LEAST_ROUGH_CORRELATION]
@@ -154,6 +159,7 @@ class MarkerReader:
             return None
         blur = blur[owner[best]]
         aligned, listed = aligned[best], entries[best]
+        # the dear fit, with more samples a cell, is for those alone that are left
         start, blur = self._softened(aligned, patches[best], listed, correlation[best, 0], blur)
         aligned = self.fit.refine(pyramid, aligned, start, blur, _FINE_ITERATIONS)
         return self._judged(pyramid, aligned, blur, listed)

@@ -223,12 +223,15 @@ class MarkerDetector:
         pyramid = ImagePyramid(prepared.grey)
         quads = self._candidates(prepared, pyramid)
         if len(expected):
+            # a marker that stood there may stand there still although nothing outlines it now
             quads = np.concatenate([np.asarray(expected, dtype=float), quads])
         if not len(quads):
             return []
         homographies = homographies_of(quads)
         cells = self._reader.read_cells(pyramid, homographies)
         found = self._shown_by_cells(pyramid, homographies, cells)
+        # the cells of a marker that is read have outlines of their own; to match each with all
+        # codes is the dearest step
         unread = np.flatnonzero(~_covered(quads, found))
         for start in range(0, len(unread), _BATCH):
             part = unread[start : start + _BATCH]
@@ -247,12 +250,14 @@ class MarkerDetector:
             return []
         cells = cells.chosen(shown)
         homographies = self._reader.aligned(pyramid, homographies[shown], cells)
+        # a draw with the second best code is no confidence at all
         confidence = cells.correlation * (1.0 - 1.0 / cells.lead)
         return self._detections(pyramid, homographies, cells.entries, confidence)
 
     def _candidates(self, prepared: PreparedImage, pyramid: ImagePyramid) -> Quads:
         """Return quadrilaterals (m, 4, 2) that look like a marker's border, the likeliest first."""
         settings = self.settings
+        # noise with a normal distribution exceeds three deviations to one side in 1 of 740 pixels
         contrast = max(settings.contrast, 3.0 * prepared.noise)
         masks = dark_masks(
             prepared.smooth,
@@ -261,6 +266,7 @@ class MarkerDetector:
             settings.bridges,
             touching=settings.border > 1,
         )
+        # a smaller image has the same work to spare, not more outlines that are clutter
         limit = settings.max_outlines * max(1.0, _FULL_WORK / prepared.grey.size)
         quads = quads_around(masks, min_length=settings.min_length, limit=limit)
         correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
@@ -268,8 +274,11 @@ class MarkerDetector:
         quads, correlation = quads[passed], correlation[passed]
         fitted = self._edges.fitted(pyramid, quads)
         better = self._border.correlation(pyramid, homographies_of(fitted), contrast)
+        # the fit may run to a stronger edge beside the border: it counts where the border shows
+        # more clearly within it
         closer = better > correlation
         quads[closer], correlation[closer] = fitted[closer], better[closer]
+        # masks of several neighbourhoods outline one marker several times: the clearest stays
         best = np.argsort(-correlation)
         best = best[distinct(quads[best], _SAME_QUAD)]
         self.left_out = max(0, len(best) - settings.max_candidates)
@@ -284,6 +293,7 @@ class MarkerDetector:
         spare = codes.bits**2 - np.log2(len(codes.ids))
         # print looks like some code where a dictionary uses a large part of all there are
         lead = lead * max(1.0, (_FEW_SPARE_BITS - spare) / _STRICT_BITS)
+        # with the border and without: every code has the border, so that it lifts a poor agreement
         matched = (
             (readings.correlation > settings.least_correlation)
             & (np.minimum(readings.lead, readings.inner_lead) > lead)
