@@ -22,12 +22,9 @@ LIBRARIES = {name for name, path in MODULES.items() if 'libs' in path.parts}
 
 DOUBLE_NAMES: dict[str, str] = {
     'ArmorClient': '',
-    'Backlog': '',
     'Kind': '',
-    'Looking': '',
     'Progress': '',
     'Reasoner': '',
-    'Sighting': '',
     'State': '',
     'Station': '',
     '_Known': '',
@@ -64,7 +61,7 @@ TO_BE_CUT = {
     'Navigator',
     'Observer',
     'Patrol',
-    'RoomLook',
+    'RoomInspection',
 }
 """Classes over the limits that own more than one thing."""
 KNOWING_ROS = {

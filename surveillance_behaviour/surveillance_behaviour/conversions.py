@@ -7,12 +7,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point as PointMessage
 
 from patrol_policy.promises import CLOSED, LATER, NEVER, UNKNOWN, WITHIN, Promise
 from patrol_policy.world import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
+from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_interfaces.msg import Decision as DecisionMessage
-from surveillance_interfaces.msg import OntologyMap, OntologyPlace, RoomConnection
+from surveillance_interfaces.msg import (
+    Doubts,
+    OntologyMap,
+    OntologyPlace,
+    PlaceChecks,
+    RoomConnection,
+    ViewedPictures,
+    Viewpoints,
+)
 from surveillance_runtime.conversions import point_message, seconds_of
 
 MOST_CANDIDATES = 10_000
@@ -157,3 +167,66 @@ def map_message(places: Iterable[PlaceNote], robot_room: str) -> OntologyMap:
         ],
         robot_room=robot_room,
     )
+
+
+def viewpoints_from(message: Viewpoints) -> dict[str, list[Point]]:
+    """Return from where else each place is to be looked at, map frame, metres.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    return {each.place: [_spot_from(point) for point in each.points] for each in message.places}
+
+
+def doubts_from(message: Doubts) -> list[Doubt]:
+    """Return the alerts that wait for a second look.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    return [
+        Doubt(each.number, each.place, _perhaps(each.look_from), _perhaps(each.position))
+        for each in message.doubts
+    ]
+
+
+def checks_from(message: PlaceChecks) -> dict[str, list[Check]]:
+    """Return what the rules ask for, by place.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    found: dict[str, list[Check]] = {}
+    for each in message.checks:
+        check = Check(each.name, _spot_from(each.at), _perhaps(each.look_from), each.is_open)
+        found.setdefault(each.place, []).append(check)
+    return found
+
+
+def pictures_from(
+    message: ViewedPictures,
+) -> tuple[list[tuple[float, float | None]] | None, float | None]:
+    """Return which pictures were looked at, and how much of the horizon one shows.
+
+    Returns:
+        Of each when it was taken, seconds, and to which bearing, rad, None: not known; or None:
+        nobody looks at pictures. And the camera's angle, rad; None: not known.
+    """
+    angle = message.angle[0] if len(message.angle) else None
+    if not message.camera:
+        return None, angle
+    looked = [
+        (seconds_of(each.stamp), each.bearing[0] if len(each.bearing) else None)
+        for each in message.looked
+    ]
+    return looked, angle
+
+
+def _spot_from(message: PointMessage) -> Point:
+    if not (math.isfinite(message.x) and math.isfinite(message.y)):
+        raise ValueError(f'expected finite numbers, got {message.x}, {message.y}')
+    return message.x, message.y, 0.0
+
+
+def _perhaps(points: Sequence[PointMessage]) -> Point | None:
+    return _spot_from(points[0]) if len(points) else None

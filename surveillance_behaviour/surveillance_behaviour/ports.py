@@ -225,7 +225,7 @@ class Check:
     is_open: bool = False
 
 
-class Looking(Protocol):
+class InspectionPort(Protocol):
     """Who knows from where a place is to be looked at, and moves the robot there."""
 
     def viewpoints(self, place: str) -> Sequence[Point]:
@@ -296,4 +296,4 @@ class Ports:
     reasoner: Reasoner
     motion: Motion | None = None
     routine: Routine | None = None
-    looking: Looking | None = None
+    looking: InspectionPort | None = None

@@ -28,7 +28,7 @@ from surveillance_behaviour.ros_adapters.decision_services import (
     decision_maker_of,
     offer_decision_services,
 )
-from surveillance_behaviour.ros_adapters.looking import RosLooking
+from surveillance_behaviour.ros_adapters.looking import RosInspection
 from surveillance_behaviour.ros_adapters.peers import (
     Deadlines,
     MissionClock,
@@ -131,7 +131,7 @@ class RobotBehavior(PatrolNode):
         """Return the peers of the machine that runs; in `surveillance` this process decides."""
         clock = self._mission_clock
         ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
-        looking = RosLooking(self, deadlines, clock) if self._looks else None
+        looking = RosInspection(self, deadlines, clock) if self._looks else None
         if self._behaviour == 'patrol':
             reasoner = ReasonClient(self, deadlines, ontology, battery)
             routine = RosRoutine(self, deadlines, battery, clock)

@@ -61,7 +61,7 @@ RULES = (
 
 
 @dataclass(frozen=True)
-class Sighting:
+class EventSighting:
     """One observation of an event.
 
     Attributes:
@@ -104,8 +104,8 @@ class EventFact:
     subject: str
     level: str
     state: str
-    first: Sighting
-    last: Sighting
+    first: EventSighting
+    last: EventSighting
     checked_every: int
 
     def __post_init__(self) -> None:

@@ -8,15 +8,14 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from std_msgs.msg import String
-
-from strict_files.regular_files import parse_json
+from surveillance_interfaces.msg import ObservedEvents
+from surveillance_perception.observing.conversions import event_from_ros
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
 from surveillance_runtime.state_topics import StateSubscription
 
-MOST_BYTES = 4_000_000
-"""A message that is longer is not read."""
+MOST_EVENTS = 2000
+"""A message with more is not read."""
 _PICTURE = re.compile(r'\d_\d{13}_[A-Za-z0-9-]{1,60}\.jpg\Z')
 _ANSWERED = ('normal', 'acknowledged', 'false alarm')
 
@@ -39,7 +38,7 @@ class Sightings:
     def follow(self, robot: str) -> None:
         """Hear a robot of a fleet, too; a robot that is alone has no name."""
         topic = name_for(robot, 'events')
-        StateSubscription(self._node, String, topic, partial(self._on_events, robot))
+        StateSubscription(self._node, ObservedEvents, topic, partial(self._on_events, robot))
 
     def listed(self, robot: str = '') -> dict[str, Any]:
         """Return all events of a robot, the newest first, and how many were false alarms."""
@@ -75,28 +74,16 @@ class Sightings:
         except OSError:
             return None
 
-    def _on_events(self, robot: str, message: String) -> None:
+    def _on_events(self, robot: str, message: ObservedEvents) -> None:
         try:
-            if len(message.data) > MOST_BYTES:
-                raise ValueError(f'more than {MOST_BYTES} bytes')
-            events = parse_json(message.data.encode())
-            if not isinstance(events, list) or not all(_is_event(each) for each in events):
-                raise ValueError('expected a list of events')
+            if (count := len(message.events)) > MOST_EVENTS:
+                raise ValueError(f'{count} events: expected at most {MOST_EVENTS}')
+            events = [event_from_ros(each).to_json() for each in message.events]
         except ValueError as error:
             self._node.get_logger().warn(f'events: {error}', throttle_duration_sec=60.0)
             return
         with self._lock:
             self._events[robot] = events
-
-
-def _is_event(value: Any) -> bool:
-    """Tell whether a value has what the page shows of an event, of the types it expects."""
-    if not isinstance(value, dict) or not isinstance(value.get('number'), int):
-        return False
-    texts = all(isinstance(value.get(key), str) for key in ('kind', 'seen', 'place', 'state'))
-    times = all(isinstance(value.get(key), int | float) for key in ('began', 'last'))
-    pictures = value.get('evidence', [])
-    return texts and times and isinstance(pictures, list)
 
 
 @lru_cache(64)

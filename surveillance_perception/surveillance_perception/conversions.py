@@ -33,9 +33,10 @@ from surveillance_interfaces.srv import RoomInformation
 from surveillance_perception.arm.scan import ScanOutcome, ScanPlan, View
 from surveillance_perception.arm.trajectory import ArmTrajectory
 from surveillance_perception.marker_registry import MarkedPlace
+from surveillance_perception.observing.camera_tracker import matrix_of
 from surveillance_perception.stream.encodings import image_of_pixels, printable
 from surveillance_perception.stream.image_files import ImageArray, decode_image
-from surveillance_runtime.conversions import PlanarPose, pose_from
+from surveillance_runtime.conversions import pose_from
 
 if TYPE_CHECKING:  # the detector behind it takes 0.2 s to import: one node needs it
     from marker_detection import Sighting
@@ -321,16 +322,6 @@ def pose_on_map(
         ValueError: A number is not finite, or the orientation is zero.
     """
     return matrix_of(pose_from(message.pose.pose)), doubt_from(message)
-
-
-def matrix_of(pose: PlanarPose) -> npt.NDArray[np.float64]:
-    """Return the transform (4, 4) from the frame of a pose in the plane."""
-    x, y, yaw = pose
-    cosine, sine = math.cos(yaw), math.sin(yaw)
-    matrix = np.eye(4)
-    matrix[:2, :2] = [[cosine, -sine], [sine, cosine]]
-    matrix[:2, 3] = x, y
-    return matrix
 
 
 def doubt_from(message: PoseWithCovarianceStamped) -> tuple[float, float]:

@@ -13,7 +13,7 @@ import state_machines as fsm
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
-from surveillance_behaviour.mission.looking import RoomLook, one_way
+from surveillance_behaviour.mission.looking import RoomInspection, one_way
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_runtime.event_log import read
@@ -490,7 +490,7 @@ class Stay:
         for name in ('face', 'drive', 'rest_arm'):
             setattr(self.looking, name, self._noting(name, getattr(self.looking, name)))
         self.run.mission.note = self._note  # type: ignore[method-assign]
-        self.look = RoomLook(self.run.mission)
+        self.look = RoomInspection(self.run.mission)
         self.put('C1')
 
     def put(self, place: str) -> None:

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import PoseWithCovarianceStamped
+from geometry_msgs.msg import Point, PoseWithCovarianceStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool
 
 from state_machines import Interrupt
 from state_machines.exceptions import CallInterruptedError
 from state_machines.ros import GoalServer, work_aside
-from surveillance_behaviour.ros_adapters.looking import RosLooking
+from surveillance_behaviour.ros_adapters.looking import RosInspection
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock
 from surveillance_interfaces.action import FollowPath
+from surveillance_interfaces.msg import PlaceCheck, PlaceChecks, ViewedPicture, ViewedPictures
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
-from surveillance_runtime.conversions import point_from, pose_estimate
+from surveillance_runtime.conversions import point_from, pose_estimate, stamp_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.spin_in_place import bearing_of
@@ -45,12 +45,12 @@ class Arm(PatrolNode):
         return response
 
 
-def looking_of(graph: Any) -> RosLooking:
+def looking_of(graph: Any) -> RosInspection:
     node = graph.add(PatrolNode, name='robot_behavior')
-    return RosLooking(node, Deadlines(), MissionClock(node))
+    return RosInspection(node, Deadlines(), MissionClock(node))
 
 
-def tell_pose(graph: Any, looking: RosLooking, x: float, y: float, yaw: float) -> None:
+def tell_pose(graph: Any, looking: RosInspection, x: float, y: float, yaw: float) -> None:
     poses = graph.node.create_publisher(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
     poses.publish(PoseWithCovarianceStamped(pose=pose_estimate((x, y, yaw), 0.1, 0.1)))
     graph.until(lambda: looking.position() is not None)
@@ -143,7 +143,7 @@ def test_an_arm_that_can_be_pointed_looks_at_any_side(graph: Any) -> None:
 def test_a_side_is_seen_once_a_picture_of_it_was_looked_at(graph: Any) -> None:
     looking, arm = looking_of(graph), graph.add(Arm)
     arm.released.set()
-    tell = graph.node.create_publisher(String, 'pictures', STATE_QOS)
+    tell = graph.node.create_publisher(ViewedPictures, 'pictures', STATE_QOS)
     tell_pose(graph, looking, 1.0, 2.0, 0.0)
     graph.until(looking.has_arm)
 
@@ -151,8 +151,13 @@ def test_a_side_is_seen_once_a_picture_of_it_was_looked_at(graph: Any) -> None:
         return 1e-9 * float(graph.node.get_clock().now().nanoseconds)
 
     def looked(*pictures: tuple[float, int | None], camera: bool = True) -> None:
-        told = {'camera': camera, 'looked': pictures, 'angle': 60}
-        tell.publish(String(data=json.dumps(told)))
+        told = ViewedPictures(camera=camera, angle=[math.radians(60)])
+        for taken, bearing in pictures:
+            sides = [] if bearing is None else [math.radians(bearing)]
+            told.looked.append(
+                ViewedPicture(stamp=stamp_from(math.ceil(1e9 * taken)), bearing=sides)
+            )
+        tell.publish(told)
 
     before = now()
     looking.face(math.pi / 2, Interrupt())
@@ -173,9 +178,10 @@ def test_a_side_is_seen_once_a_picture_of_it_was_looked_at(graph: Any) -> None:
 
 def test_what_the_rules_ask_for_is_known_by_place(graph: Any) -> None:
     looking = looking_of(graph)
-    told = {'C1': [{'name': 'marker 21', 'at': [1, 2], 'from': None}]}
-    graph.node.create_publisher(String, 'checks', STATE_QOS).publish(String(data=json.dumps(told)))
+    check = PlaceCheck(place='C1', name='marker 21', at=Point(x=1.0, y=2.0))
+    tell = graph.node.create_publisher(PlaceChecks, 'checks', STATE_QOS)
+    tell.publish(PlaceChecks(checks=[check]))
     graph.until(lambda: looking.checks('C1'))
-    (check,) = looking.checks('C1')
-    assert (check.name, check.point[:2], check.look_from) == ('marker 21', (1.0, 2.0), None)
+    (known,) = looking.checks('C1')
+    assert (known.name, known.point[:2], known.look_from) == ('marker 21', (1.0, 2.0), None)
     assert not looking.checks('C2')

@@ -16,7 +16,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool
 
 from indoor_watch.hung_markers import HungSpot
 from indoor_watch.lost_sight import LostSight
@@ -26,12 +26,16 @@ from surveillance_interfaces.msg import (
     FleetRobot,
     MarkerDetection,
     MarkerDetectionArray,
+    ObservedEvent,
+    ObservedEvents,
+    PlaceChecks,
     RobotPlace,
+    ViewedPictures,
 )
 from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_perception import observer_node
 from surveillance_perception.observer_node import Observer
-from surveillance_runtime.conversions import map_from
+from surveillance_perception.observing import picture_chooser
 from surveillance_runtime.event_log import read
 from surveillance_runtime.incidents import Cause
 from surveillance_runtime.node import PatrolNode
@@ -83,9 +87,12 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
     maps, places = make(OccupancyGrid, 'map', STATE_QOS), make(RobotPlace, 'robot_place', STATE_QOS)
     poses = make(PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS)
     scans = make(LaserScan, 'scan', SENSOR_QOS)
-    events = graph.listen(String, 'events', STATE_QOS)
+    events = graph.listen(ObservedEvents, 'events', STATE_QOS)
     maps.publish(room_map())
     graph.until(lambda: scans.get_subscription_count() and poses.get_subscription_count())
+
+    def seen() -> list[ObservedEvent]:
+        return [each for each in events[-1].events if each.seen == 'appeared'] if events else []
 
     def look(place: str, box: tuple[float, float, float] | None, done) -> None:
         places.publish(RobotPlace(place=place))
@@ -109,11 +116,11 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
 
     look('R1', None, lambda number: node.sweeps >= 8)
     look('R2', None, lambda number: node.sweeps >= 12)
-    look('R1', (1.5, 1.5, 0.2), lambda number: events and 'appeared' in events[-1].data)
-    (event,) = json.loads(events[-1].data)
-    assert (event['kind'], event['seen'], event['place']) == ('object', 'appeared', 'R1')
-    assert math.dist(event['position'], (1.5, 1.5)) < 0.25
-    assert (tmp_path / 'evidence' / event['evidence'][0]).stat().st_size > 1000
+    look('R1', (1.5, 1.5, 0.2), lambda number: bool(seen()))
+    (event,) = seen()
+    assert (event.kind, event.seen, event.place) == ('object', 'appeared', 'R1')
+    assert math.dist((event.position[0].x, event.position[0].y), (1.5, 1.5)) < 0.25
+    assert (tmp_path / 'evidence' / event.evidence[0]).stat().st_size > 1000
     assert Cause('event', '1') in node.incidents.open()
 
     caller = ServiceCaller(graph.node, ConsoleCommand, 'observer/command')
@@ -123,7 +130,7 @@ def test_a_box_is_told_with_a_picture_and_a_person_calls_it_normal(graph, tmp_pa
     assert answer.accepted
     assert 'is normal' in answer.answer
     graph.until(lambda: not node.incidents.open())
-    graph.until(lambda: json.loads(events[-1].data)[0]['state'] == 'normal')
+    graph.until(lambda: events[-1].events[0].state == 'normal')
     graph.remove(node)
     kept = json.loads((tmp_path / 'observer.json').read_text())
     assert kept['book']['events'] == [], 'what is over is in the log'
@@ -148,7 +155,7 @@ def test_it_hears_of_the_other_robots_of_its_fleet_and_where_they_are(graph):
         pose.header.stamp = graph.node.get_clock().now().to_msg()
         poses.publish(pose)
         now = 1e-9 * graph.node.get_clock().now().nanoseconds
-        return list(node.others.at(now)) == [(4.0, 1.0)]
+        return list(node.worker.others.at(now)) == [(4.0, 1.0)]
 
     graph.until(heard)
 
@@ -186,7 +193,7 @@ class Eyes:
     def __init__(self, graph, monkeypatch):
         self.node = graph.add(Observer, {'facts': False})
         for each in ('PICTURE_PERIOD', 'STANDING_PATIENCE'):
-            monkeypatch.setattr(observer_node, each, 0.0)
+            monkeypatch.setattr(picture_chooser, each, 0.0)
         self.now = 1e-9 * graph.node.get_clock().now().nanoseconds
         self.camera: Any = None
         self.looked: list[tuple[tuple[float, ...] | None, list[int] | None]] = []
@@ -197,10 +204,11 @@ class Eyes:
         clock = SimpleNamespace(now=lambda: self.clock)
         monkeypatch.setattr(self.node, 'get_clock', lambda: clock)
 
-    def _look(self, _data, viewpoint, _stamp, markers, camera):
-        numbers = None if markers is None else [each.number for each in markers]
-        self.looked.append((viewpoint, numbers))
-        self.camera = camera
+    def _look(self, chosen):
+        read = chosen.markers
+        numbers = None if read is None else [each.number for each in read]
+        self.looked.append((chosen.viewpoint, numbers))
+        self.camera = chosen.camera
 
     def stamp(self, since: float) -> Time:
         nanoseconds = round(1e9 * (self.now + since))
@@ -323,7 +331,7 @@ def test_joints_come_from_several_drivers_and_wheels_turn_no_camera(graph, monke
     assert eyes.looked[-1] == ((1.0, 5.0, 0.0, *ARM.home), None)
     for number in range(100):
         eyes.bend(2.0, [f'of_a_stranger_{number}'], [0.0])
-    assert len(eyes.node._joints) <= observer_node.MOST_JOINT_GROUPS
+    assert eyes.looked[-1] == ((1.0, 5.0, 0.0, *ARM.home), None)
 
 
 @pytest.mark.parametrize('off', [-3600.0, 3600.0, 1.0])
@@ -370,7 +378,7 @@ def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch
     # One that is alive is waited for, and what it says of another picture is no answer.
     graph.node.create_publisher(MarkerDetectionArray, 'aruco_detector/detections', 10)
     graph.until(lambda: eyes.node._detections.get_publisher_count())
-    monkeypatch.setattr(observer_node, 'DETECTOR_PATIENCE', 100.0)
+    monkeypatch.setattr(picture_chooser, 'DETECTOR_PATIENCE', 100.0)
     eyes.show(-0.1)
     eyes.detect(-0.2, 15)
     assert len(eyes.looked) == 3
@@ -428,27 +436,28 @@ def test_it_tells_which_sides_it_has_seen_and_from_where_a_marker_is_to_be_read(
     parameters = {
         'facts': False,
         'watch_file': str(tmp_path / 'watch.yaml'),
+        'room_positions.R1': [1.0, 2.5],
     }
     node = graph.add(Observer, parameters)
-    pictures = graph.listen(String, 'pictures', STATE_QOS)
-    checks = graph.listen(String, 'checks', STATE_QOS)
+    pictures = graph.listen(ViewedPictures, 'pictures', STATE_QOS)
+    checks = graph.listen(PlaceChecks, 'checks', STATE_QOS)
     spot = HungSpot(21, (5.8, 2.5, 1.0), math.pi, 0.2)
-    monkeypatch.setattr(node._monitor, 'spots', lambda: [spot])
-    node._points['R1'] = (1.0, 2.5)
-    node._places.set_positions(node._points)
-    grid = map_from(room_map(), 100_000)
-    node._places.set_map(grid)
-    node._tell_viewpoints(grid)
-    node._tell_checks()
-    graph.until(lambda: checks and json.loads(checks[-1].data))
-    ((place, (check,)),) = json.loads(checks[-1].data).items()
-    assert (place, check['name'], check['at']) == ('R1', 'marker 21', [5.8, 2.5])
-    assert 0.8 <= math.dist(check['from'], check['at']) <= 2.2
-    node._seen_sides.append((5.0, 90))
+    monkeypatch.setattr(node.worker.monitor, 'spots', lambda: [spot])
+    graph.node.create_publisher(OccupancyGrid, 'map', STATE_QOS).publish(room_map())
+    graph.until(lambda: checks and checks[-1].checks)
+    (check,) = checks[-1].checks
+    assert (check.place, check.name, check.at.x, check.at.y) == ('R1', 'marker 21', 5.8, 2.5)
+    assert 0.8 <= math.dist((check.look_from[0].x, check.look_from[0].y), (5.8, 2.5)) <= 2.2
     info = CameraInfo(width=640, height=480, k=[554.3, 0, 320, 0, 554.3, 240, 0, 0, 1.0])
-    node._on_camera_info(info)
-    graph.until(lambda: 'angle' in pictures[-1].data)
-    assert json.loads(pictures[-1].data) == {'camera': True, 'looked': [[5.0, 90]], 'angle': 60}
+    sender = graph.node.create_publisher(CameraInfo, 'camera/rgb/camera_info', SENSOR_QOS)
+
+    def known() -> bool:
+        sender.publish(info)
+        return bool(pictures and len(pictures[-1].angle))
+
+    graph.until(known)
+    assert pictures[-1].camera
+    assert pictures[-1].angle[0] == pytest.approx(math.radians(60.0), abs=0.01)
 
 
 def test_a_marker_that_is_read_on_the_way_is_looked_for_where_it_hangs(graph, monkeypatch):
@@ -465,7 +474,7 @@ def test_a_marker_that_is_read_on_the_way_is_looked_for_where_it_hangs(graph, mo
     message = MarkerDetectionArray(detections=[marker])
     message.header.stamp = eyes.stamp(-0.525)
     eyes.node._on_detections(message)
-    (spot,) = eyes.node._monitor.spots()
+    (spot,) = eyes.node.worker.monitor.spots()
     lens = ARM.camera_frame(ARM.home)[:3, 3]
     assert spot.position == pytest.approx((-0.525 + lens[0] + 2.0, 5.0, lens[2]), abs=0.02)
     assert abs(spot.facing) == pytest.approx(math.pi)

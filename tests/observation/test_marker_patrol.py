@@ -26,7 +26,7 @@ from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.pose import pose_of
 from state_machines import Interrupt
-from surveillance_behaviour.mission.looking import RoomLook
+from surveillance_behaviour.mission.looking import RoomInspection
 from surveillance_behaviour.mission.mission_log import InspectionLog
 from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_simulation.camera.model import Camera, Conditions, expose
@@ -100,7 +100,7 @@ class Patrol:
             note=lambda *_, **__: None,
             say=lambda *_, **__: None,
         )
-        self.looks = RoomLook(cast('Any', self.mission))
+        self.looks = RoomInspection(cast('Any', self.mission))
 
     def visit(self, ahead: float) -> None:
         """Come from another place, look about, and leave.

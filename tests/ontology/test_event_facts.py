@@ -13,13 +13,13 @@ from armor_service.protocol import DirectiveRequest, ListResponse
 from armor_service.service import ArmorService
 from floor_plans import read_place
 from libs.armor_service.tests.seven_rooms import IRI
-from surveillance_ontology.event_facts import MOST_EVENTS, EventFact, EventOntology, Sighting
+from surveillance_ontology.event_facts import MOST_EVENTS, EventFact, EventOntology, EventSighting
 from surveillance_ontology.map_ontology import MapOntology
 from surveillance_ontology.patrol_vocabulary import ONTOLOGY
 from surveillance_ontology.robot_ontology import RobotOntology
 
 PLACE = read_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml').place
-SEEN = Sighting(130, 0.98, (10.0, 14.5), '3_130_door-D3-closed.jpg')
+SEEN = EventSighting(130, 0.98, (10.0, 14.5), '3_130_door-D3-closed.jpg')
 DOOR = EventFact(3, 'Door', 'closed', 'R3', 'D3', 'Alert', 'Open', SEEN, SEEN, 20)
 
 
@@ -77,7 +77,7 @@ def test_an_alert_is_proved_from_its_observations(armor: ArmorClient):
 
 
 def test_each_sighting_says_when_where_how_surely_and_by_whom(armor: ArmorClient):
-    later = Sighting(150, 0.5, compared_with='empty.jpg', by='tb2')
+    later = EventSighting(150, 0.5, compared_with='empty.jpg', by='tb2')
     EventOntology(armor).tell([replace(DOOR, subject='', last=later)])
     expected = {
         'observedAt': ('130', '150'),

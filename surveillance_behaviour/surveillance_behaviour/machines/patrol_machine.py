@@ -26,7 +26,7 @@ from surveillance_behaviour.machines.shared_states import (
     check_path,
     follow,
 )
-from surveillance_behaviour.mission.looking import RoomLook
+from surveillance_behaviour.mission.looking import RoomInspection
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.ports import Point, Routine
@@ -143,7 +143,7 @@ class Looking(MachineState):
 
     def __init__(self, mission: Mission) -> None:
         super().__init__(mission)
-        self._room_look = RoomLook(mission)
+        self._room_look = RoomInspection(mission)
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission

@@ -21,7 +21,7 @@ from surveillance_behaviour.machines.shared_states import (
     check_path,
     follow,
 )
-from surveillance_behaviour.mission.looking import RoomLook
+from surveillance_behaviour.mission.looking import RoomInspection
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
 from surveillance_behaviour.ports import Point
@@ -71,7 +71,7 @@ class ExploreTask(MachineState):
             mission.say(f'exploring {mission.place} ends early: {why()}')
         return 'explored'
 
-    def __init__(self, mission: Mission, room_look: RoomLook) -> None:
+    def __init__(self, mission: Mission, room_look: RoomInspection) -> None:
         super().__init__(mission)
         self._room_look = room_look
 
@@ -92,7 +92,7 @@ class VerifyTask(MachineState):
 
     ends = ('verified',)
 
-    def __init__(self, mission: Mission, room_look: RoomLook) -> None:
+    def __init__(self, mission: Mission, room_look: RoomInspection) -> None:
         super().__init__(mission)
         self._room_look = room_look
 
@@ -205,7 +205,7 @@ def surveillance_machine(mission: Mission) -> fsm.StateMachine:
             recharge='RECHARGE_TASK',
             explore='EXPLORE_TASK',
         )
-        verifies, room_look = mission.ports.looking is not None, RoomLook(mission)
+        verifies, room_look = mission.ports.looking is not None, RoomInspection(mission)
         add(
             'EXPLORE_TASK',
             ExploreTask(mission, room_look),

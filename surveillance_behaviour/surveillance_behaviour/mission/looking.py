@@ -2,8 +2,8 @@
 that there is; and again.
 
 From where a room is to be looked at, and which alerts wait for a second look, says who watches (the
-port `Looking`). What cannot be driven to or turned is left out: a look is never a reason to stop
-patrolling. In a room with a charging station the robot keeps its place, so that it may charge.
+port `InspectionPort`). What cannot be driven to or turned is left out: a look is never a reason to
+stop patrolling. In a room with a charging station the robot keeps its place, so that it may charge.
 
 What does not fit into one stay comes first in the next one, also after a restart. A side counts as
 looked at in the record once a picture of it was looked at, not when the camera was turned there.
@@ -22,7 +22,7 @@ from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.mission_log import side_name, stand_name
-from surveillance_behaviour.ports import Check, Doubt, Looking, Point
+from surveillance_behaviour.ports import Check, Doubt, InspectionPort, Point
 
 SETTLE = 4.0
 """Seconds for which the robot stands at a viewpoint, so that sweeps and pictures are compared."""
@@ -85,7 +85,7 @@ class _Stay:
     faced: bool = False
 
 
-class RoomLook:
+class RoomInspection:
     """Looks at the rooms of a mission.
 
     Args:
@@ -146,7 +146,7 @@ class RoomLook:
         seconds = round(self._elapsed() - self._began, 3)
         self._mission.note('exploring', place=self._mission.place, seconds=seconds, **side)
 
-    def _look(self, looking: Looking, end: float, interrupt: Interrupt) -> None:
+    def _look(self, looking: InspectionPort, end: float, interrupt: Interrupt) -> None:
         """Look at the place, as far as that goes until a time."""
         mission = self._mission
         if end - self._elapsed() < SETTLE:
@@ -177,7 +177,7 @@ class RoomLook:
 
     def _look_from(
         self,
-        looking: Looking,
+        looking: InspectionPort,
         stay: _Stay,
         stands: list[Point | None],
         interrupt: Interrupt,
@@ -207,7 +207,9 @@ class RoomLook:
         self._aim_ahead(looking, stay, interrupt)
         self._say_short(looking, stay, stands)
 
-    def _say_short(self, looking: Looking, stay: _Stay, stands: Sequence[Point | None]) -> None:
+    def _say_short(
+        self, looking: InspectionPort, stay: _Stay, stands: Sequence[Point | None]
+    ) -> None:
         """Say once of a place that a stay is too short to drive to some viewpoints at all."""
         mission, own = self._mission, stay.own
         if own is None or mission.place in self._short:
@@ -222,7 +224,7 @@ class RoomLook:
                 'would do (exploration_seconds)'
             )
 
-    def _look_at_checks(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
+    def _look_at_checks(self, looking: InspectionPort, stay: _Stay, interrupt: Interrupt) -> None:
         """Look at what the rules ask for, what waits longest first, for half of the time.
 
         What was looked at and is not settled comes before that. Where there is no time for more
@@ -283,13 +285,13 @@ class RoomLook:
         key = self._mission.place, check.name
         return check.is_open and self._insisted[key] < MOST_INSISTED
 
-    def _is_checked(self, looking: Looking, name: str, pictures: int) -> bool:
+    def _is_checked(self, looking: InspectionPort, name: str, pictures: int) -> bool:
         """Tell whether so many pictures are enough for a check, and what they show is settled."""
         now = looking.checks(self._mission.place)
         is_open = any(each.name == name and each.is_open for each in now)
         return pictures >= CHECK_PICTURES and not is_open
 
-    def _aim_ahead(self, looking: Looking, stay: _Stay, interrupt: Interrupt) -> None:
+    def _aim_ahead(self, looking: InspectionPort, stay: _Stay, interrupt: Interrupt) -> None:
         """Have the arm look ahead, if it looks elsewhere."""
         if stay.faced and looking.has_arm():
             looking.face(looking.heading(), interrupt)
@@ -297,7 +299,7 @@ class RoomLook:
 
     def _face(
         self,
-        looking: Looking,
+        looking: InspectionPort,
         stay: _Stay,
         bearing: float,
         latest: float,
@@ -348,7 +350,7 @@ class RoomLook:
             mission.note('verify', place=mission.place, number=doubt.number, found=found)
             mission.say(f'looked again: event {doubt.number} {found}')
 
-    def _look_again(self, looking: Looking, doubt: Doubt, interrupt: Interrupt) -> None:
+    def _look_again(self, looking: InspectionPort, doubt: Doubt, interrupt: Interrupt) -> None:
         """Drive to where a doubt is looked at from, and stand until it is settled."""
         mission = self._mission
         drives = mission.place not in mission.settings.choice.recharge_rooms
@@ -368,14 +370,14 @@ class RoomLook:
         else:
             self._await_settled(looking, doubt, interrupt)
 
-    def _await_settled(self, looking: Looking, doubt: Doubt, interrupt: Interrupt) -> None:
+    def _await_settled(self, looking: InspectionPort, doubt: Doubt, interrupt: Interrupt) -> None:
         """Stand until a doubt is settled, or for a look."""
         end = self._elapsed() + SETTLE
         while self._doubted(looking, doubt) and self._elapsed() < end:
             if not self._mission.clock.sleep(POLL, interrupt):
                 raise CallInterruptedError
 
-    def _doubted(self, looking: Looking, doubt: Doubt) -> bool:
+    def _doubted(self, looking: InspectionPort, doubt: Doubt) -> bool:
         """Tell whether a doubt still waits."""
         return any(each.number == doubt.number for each in looking.doubts(self._mission.place))
 
@@ -431,7 +433,7 @@ class RoomLook:
 
     def _turn(
         self,
-        looking: Looking,
+        looking: InspectionPort,
         stay: _Stay,
         point: Point | None,
         others: Sequence[Point],

@@ -1,28 +1,34 @@
 """What the node `observer` tells a robot that looks, and the driving and turning for a look.
 
-`viewpoints` is JSON of the form `{"R1": [[x, y], ...]}`, `checks` tells of each place what the
-rules want to have seen there, `doubts` is a list of alerts that wait for a second look, `pictures`
-tells which sides were in the pictures that were looked at last, and `sees_around` whether it sees
-all around without a turn. The first word of that says that the observer sees, which the first look
-of this process waits for. Without an observer there are no viewpoints, and the robot looks nowhere.
+`viewpoints` says from where each place is to be looked at, `checks` what the rules want to have
+seen there, `doubts` which alerts wait for a second look, `pictures` which sides were in the
+pictures that were looked at last, and `sees_around` whether it sees all around without a turn. The
+first word of that says that the observer sees, which the first look of this process waits for.
+Without an observer there are no viewpoints, and the robot looks nowhere.
 """
 
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 from collections.abc import Sequence
 from typing import Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool
 
 from state_machines import Interrupt
 from state_machines.ros import CallError, GoalCaller, ServiceCaller
+from surveillance_behaviour.conversions import (
+    checks_from,
+    doubts_from,
+    pictures_from,
+    viewpoints_from,
+)
 from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_behaviour.ros_adapters.peers import Deadlines, MissionClock, run
 from surveillance_interfaces.action import ComputePath, FollowPath
+from surveillance_interfaces.msg import Doubts, PlaceChecks, ViewedPictures, Viewpoints
 from surveillance_interfaces.srv import MarkerRoutine, PointCamera
 from surveillance_runtime.conversions import (
     point_from,
@@ -32,6 +38,7 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.robot_arm import ARM
+from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.spin_in_place import spin_path
 from surveillance_runtime.state_topics import StateSubscription
 
@@ -58,7 +65,7 @@ SAME_SIDE = 0.35
 """A picture whose middle is so near to a bearing shows it, rad."""
 
 
-class RosLooking:
+class RosInspection:
     """The observer's topics, `compute_path`, `follow_path` and `move_arm`."""
 
     def __init__(self, node: PatrolNode, deadlines: Deadlines, clock: MissionClock) -> None:
@@ -82,10 +89,10 @@ class RosLooking:
         self._watches = Interrupt()
         self._resting = Interrupt()
         StateSubscription(node, Bool, 'sees_around', self._on_sees_around)
-        StateSubscription(node, String, 'viewpoints', self._on_viewpoints)
-        StateSubscription(node, String, 'doubts', self._on_doubts)
-        StateSubscription(node, String, 'checks', self._on_checks)
-        StateSubscription(node, String, 'pictures', self._on_pictures)
+        StateSubscription(node, Viewpoints, 'viewpoints', self._on_viewpoints)
+        StateSubscription(node, Doubts, 'doubts', self._on_doubts)
+        StateSubscription(node, PlaceChecks, 'checks', self._on_checks)
+        StateSubscription(node, ViewedPictures, 'pictures', self._on_pictures)
         StateSubscription(node, PoseWithCovarianceStamped, 'amcl_pose', self._on_pose, raw=True)
 
     def viewpoints(self, place: str) -> Sequence[Point]:
@@ -213,72 +220,22 @@ class RosLooking:
         self._sees_around = bool(message.data)
         self._watches.set()
 
-    def _on_viewpoints(self, message: String) -> None:
-        told = _read(self._node, 'viewpoints', message.data, dict)
-        self._viewpoints = {
-            str(place): [_point(each) for each in points] for place, points in told.items()
-        }
+    def _on_viewpoints(self, message: Viewpoints) -> None:
+        with refusing(self._node, 'viewpoints'):
+            self._viewpoints = viewpoints_from(message)
 
-    def _on_doubts(self, message: String) -> None:
-        told = _read(self._node, 'doubts', message.data, list)
-        self._doubts = [
-            Doubt(
-                int(each['number']),
-                str(each['place']),
-                None if each.get('look_from') is None else _point(each['look_from']),
-                None if each.get('position') is None else _point(each['position']),
-            )
-            for each in told
-        ]
+    def _on_doubts(self, message: Doubts) -> None:
+        with refusing(self._node, 'doubts'):
+            self._doubts = doubts_from(message)
 
-    def _on_checks(self, message: String) -> None:
-        told = _read(self._node, 'checks', message.data, dict)
-        self._checks = {
-            str(place): [
-                Check(
-                    str(each['name']),
-                    _point(each['at']),
-                    None if each.get('from') is None else _point(each['from']),
-                    bool(each.get('open')),
-                )
-                for each in some
-            ]
-            for place, some in told.items()
-        }
+    def _on_checks(self, message: PlaceChecks) -> None:
+        with refusing(self._node, 'checks'):
+            self._checks = checks_from(message)
 
-    def _on_pictures(self, message: String) -> None:
-        told = _read(self._node, 'pictures', message.data, dict)
-        angle = told.get('angle')
-        self._camera_angle = None if angle is None else math.radians(float(angle))
-        self._pictures = (
-            [
-                (float(taken), None if bearing is None else math.radians(float(bearing)))
-                for taken, bearing in told.get('looked', ())
-            ]
-            if told.get('camera')
-            else None
-        )
+    def _on_pictures(self, message: ViewedPictures) -> None:
+        with refusing(self._node, 'pictures'):
+            self._pictures, self._camera_angle = pictures_from(message)
 
     def _on_pose(self, serialized: bytes) -> None:
         x, y, yaw = pose_of_serialized(serialized)
         self._position, self._heading = (x, y, 0.0), yaw
-
-
-def _point(values: Sequence[float]) -> Point:
-    x, y = values
-    point = (float(x), float(y), 0.0)
-    if not all(map(math.isfinite, point)):
-        raise ValueError(f'expected finite numbers, got {values}')
-    return point
-
-
-def _read(node: PatrolNode, topic: str, text: str, kind: type) -> Any:
-    """Return what a topic tells; empty where it is something else."""
-    try:
-        told = json.loads(text)
-    except ValueError:
-        told = None
-    if not isinstance(told, kind):
-        node.get_logger().warn(f'{topic}: expected a JSON {kind.__name__}', once=True)
-        return kind()
-    return told

@@ -22,7 +22,7 @@ class _Waiting:
     worth: int
 
 
-class Backlog:
+class WorkQueue:
     """Work in the order in which it came, for one thread.
 
     Args:

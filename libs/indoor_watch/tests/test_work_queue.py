@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from indoor_watch.backlog import Backlog
+from indoor_watch.work_queue import WorkQueue
 
 
 class Worker:
@@ -11,7 +11,7 @@ class Worker:
     def __init__(self, most: dict[str, int]) -> None:
         self.dropped: list[str] = []
         self.done: list[str] = []
-        self.backlog = Backlog(most, self.dropped.append)
+        self.backlog = WorkQueue(most, self.dropped.append)
 
     def put(self, name: str, kind: str = '', worth: int = 0) -> None:
         self.backlog.put(lambda: self.done.append(name), kind, worth)
