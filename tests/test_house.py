@@ -22,7 +22,7 @@ LIBRARIES = {name for name, path in MODULES.items() if 'libs' in path.parts}
 
 DOUBLE_NAMES: dict[str, str] = {
     'ArmorClient': '',
-    'Kind': '',
+    'Kind': 'of an argument of a directive; of an observation',
     'Progress': '',
     'Reasoner': '',
     'State': '',
@@ -59,7 +59,6 @@ TO_BE_CUT = {
     'Localiser',
     'NavigationMotion',
     'Navigator',
-    'Observer',
     'Patrol',
     'RoomInspection',
 }
@@ -103,6 +102,9 @@ KNOWING_ROS = {
     'surveillance_operator.watch.view',
     'surveillance_operator.watch_command',
     'surveillance_perception.arm_commands',
+    'surveillance_perception.observing.event_facts_writer',
+    'surveillance_perception.observing.fleet_positions',
+    'surveillance_perception.observing.observer_worker',
     'surveillance_perception.stream.image_subscription',
     'surveillance_runtime.diagnostics',
     'surveillance_runtime.executor',

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 
 from armor_service.client import ArmorClient, ArmorServiceInternalError
 from armor_service.protocol import DirectiveRequest, DirectiveResponse, name_in
+from indoor_watch import Kind
 from surveillance_ontology.patrol_vocabulary import ROBOT
 
-KINDS = ('Door', 'Object', 'Marker', 'Person', 'Light', 'View', 'Way')
+KINDS = tuple(kind.capitalize() for kind in Kind)
 STATES = ('Open', 'Acknowledged', 'Normal', 'False', 'Over')
 LEVELS = ('Notice', 'Warning', 'Alert')
 MOST_EVENTS = 20

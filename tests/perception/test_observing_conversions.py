@@ -10,7 +10,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from indoor_watch import Coverage, Event, EventState, Kind, Observation
 from indoor_watch.marker_checks import MarkerCheck
-from indoor_watch.observations import KINDS
 from surveillance_behaviour.conversions import (
     checks_from,
     doubts_from,
@@ -32,10 +31,27 @@ from surveillance_perception.observing.conversions import (
 )
 
 EVENT = Event(
-    3, Kind.DOOR, 'ajar', 'C1', 'D1', (1.5, -2.25), 3, 'D1 is shut', EventState.ACKNOWLEDGED,
-    1_700_000_000.5, 1_700_000_060.25, 12, 2, 0.96, ('a', 'b'), ('3_1.jpg', '3_2.jpg'), '3', (0.0, 1.0),
-    True, ('lidar',),
-)  # fmt: skip
+    3,
+    Kind.DOOR,
+    'ajar',
+    'C1',
+    'D1',
+    (1.5, -2.25),
+    3,
+    'D1 is shut',
+    EventState.ACKNOWLEDGED,
+    1_700_000_000.5,
+    1_700_000_060.25,
+    12,
+    2,
+    0.96,
+    ('a', 'b'),
+    ('3_1.jpg', '3_2.jpg'),
+    '3',
+    (0.0, 1.0),
+    True,
+    ('lidar',),
+)
 
 
 def sent(message):
@@ -44,7 +60,7 @@ def sent(message):
 
 @pytest.mark.parametrize('kind', list(Kind))
 def test_an_observation_of_each_kind_and_state_comes_back_as_it_was(kind):
-    bare = Observation(kind, KINDS[kind].states[0], 'R1')
+    bare = Observation(kind, kind.states[0], 'R1')
     for seen in (
         bare,
         replace(
@@ -52,7 +68,7 @@ def test_an_observation_of_each_kind_and_state_comes_back_as_it_was(kind):
             robot='a', evidence='3_1.jpg', compared_with='7', seen_from=(0.5, -1.0), usual=0.75,
             sensor='lidar',
         ),
-        *(replace(bare, state=state) for state in KINDS[kind].states),
+        *(replace(bare, state=state) for state in kind.states),
     ):  # fmt: skip
         assert observation_from_ros(sent(observation_to_ros(seen))) == seen
 

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from indoor_watch.observations import Kind, Observation
+from indoor_watch.observations import Joined, Kind, Observation
 
 SAME_PLACE = 0.75
 """Two sightings of one kind without a name are of one thing up to here, metres."""
@@ -368,11 +368,10 @@ def _alike(event: Event, seen: Observation) -> bool:
         return False
     if event.subject:
         return True
-    if event.kind == Kind.VIEW:
-        return True  # it is the camera that is covered, wherever the robot is
-    if event.kind == Kind.PERSON:
-        return event.place == seen.place  # a person walks
-    if event.position is None or seen.position is None:
+    if event.kind.joined == Joined.ALWAYS:
+        return True
+    by_place = event.kind.joined == Joined.BY_PLACE
+    if by_place or event.position is None or seen.position is None:
         return event.place == seen.place
     return math.dist(event.position, seen.position) <= SAME_PLACE
 
@@ -405,6 +404,7 @@ def _from_elsewhere(event: Event, seen: Observation) -> bool:
 def _same(normal: Observation, seen: Observation) -> bool:
     if normal.kind != seen.kind or normal.state != seen.state or normal.subject != seen.subject:
         return False
-    if normal.kind == Kind.PERSON or normal.position is None or seen.position is None:
+    by_place = normal.kind.joined == Joined.BY_PLACE
+    if by_place or normal.position is None or seen.position is None:
         return normal.place == seen.place
     return math.dist(normal.position, seen.position) <= SAME_PLACE

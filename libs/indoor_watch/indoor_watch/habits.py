@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from indoor_watch.observations import Kind, Observation
+from indoor_watch.observations import Observation
 
 WEEK = 7 * 86_400.0
 HARMONICS = tuple(range(1, 29))
@@ -152,10 +152,4 @@ def _key(seen: Observation) -> str:
 
 def _value(seen: Observation) -> bool | None:
     """Return what was seen as 0 or 1: a door that is open, a person in a room, a light."""
-    if seen.kind == Kind.DOOR:
-        return seen.state == 'open'
-    if seen.kind == Kind.PERSON:
-        return seen.state == 'seen'
-    if seen.kind == Kind.LIGHT:
-        return seen.state == 'on'
-    return None
+    return seen.state == seen.kind.learned if seen.kind.learned else None

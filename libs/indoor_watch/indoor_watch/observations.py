@@ -8,35 +8,124 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from enum import StrEnum
+from enum import Enum, StrEnum, auto
+from types import MappingProxyType
 from typing import Any
+
+USUAL = 'usual'
+"""What a rule may ask for where the robot learns a kind's hours: that it is as at other times."""
+
+
+_PLAINLY: Mapping[str, str] = MappingProxyType({})
+
+
+class Joined(Enum):
+    """What makes two sightings of a thing without a name one thing."""
+
+    BY_SPOT = auto()
+    BY_PLACE = auto()
+    ALWAYS = auto()
 
 
 class Kind(StrEnum):
-    """What an observation is about."""
+    """What an observation is about: one entry for all that differs between kinds.
 
-    DOOR = 'door'
-    OBJECT = 'object'
-    MARKER = 'marker'
-    PERSON = 'person'
-    LIGHT = 'light'
-    VIEW = 'view'
-    WAY = 'way'
+    Args:
+        value: Its name: in rules (`door: D1`), observations, messages, and the ontology's classes
+            (`DoorObservation`).
+        states: The states that it knows.
+        wanted: Of these, or else, what a rule may ask for.
+        wrong: What breaks a rule, in words, with {subject} and {wanted}.
+        named: What names one; empty: the position, or the place, tells.
+        learned: The state whose hours are learned, so that a rule may ask for what is usual.
+        said: States that are said otherwise than `door D1 is ajar`, with {thing}.
+        joined: What makes two sightings of it one thing.
 
+    A test goes through all of them; docs/watching.md says what a new kind needs beside its entry.
+    """
 
-STATES: Mapping[Kind, tuple[str, ...]] = {
-    Kind.DOOR: ('open', 'closed', 'ajar'),
-    Kind.OBJECT: ('appeared', 'removed', 'moved'),
-    Kind.MARKER: ('here', 'moved', 'missing', 'double', 'unknown'),
-    Kind.PERSON: ('seen', 'nobody', 'nobody walks'),
-    Kind.LIGHT: ('on', 'off'),
-    Kind.VIEW: ('clear', 'changed', 'blocked'),
-    Kind.WAY: ('free', 'blocked'),
-}
-"""The states that each kind knows.
+    DOOR = (
+        'door',
+        ('open', 'closed', 'ajar'),
+        ('open', 'closed', 'ajar'),
+        'door{subject} not {wanted}',
+        "the name of a door, or 'all'",
+        'open',
+    )
+    OBJECT = (
+        'object',
+        ('appeared', 'removed', 'moved'),
+        ('none',),
+        'anything that was not there before',
+        '',
+        '',
+        {'appeared': '{thing} has appeared', 'moved': '{thing} was moved'},
+    )
+    MARKER = (
+        'marker',
+        ('here', 'moved', 'missing', 'double', 'unknown'),
+        ('here',),
+        'marker{subject} not where it hangs',
+        "the number that a marker shows, or 'all'",
+        '',
+        {'moved': '{thing} was moved'},
+    )
+    # That nobody is there only pictures tell; the lidar alone tells that nobody walks.
+    PERSON = (
+        'person',
+        ('seen', 'nobody', 'nobody walks'),
+        ('nobody',),
+        'a person',
+        '',
+        'seen',
+        {'seen': '{thing} was seen', 'nobody': 'nobody is', 'nobody walks': 'nobody walks'},
+        Joined.BY_PLACE,
+    )
+    LIGHT = ('light', ('on', 'off'), ('on', 'off'), 'the light not {wanted}', '', 'on')
+    # It is the camera that is covered, wherever the robot is.
+    VIEW = (
+        'view',
+        ('clear', 'changed', 'blocked'),
+        ('clear',),
+        'a view that changed or is blocked',
+        '',
+        '',
+        _PLAINLY,
+        Joined.ALWAYS,
+    )
+    WAY = ('way', ('free', 'blocked'), ('free',), 'a way that is not free')
 
-Of persons: that nobody is there only pictures tell; the lidar alone tells that nobody walks.
-"""
+    states: tuple[str, ...]
+    wanted: tuple[str, ...]
+    wrong: str
+    named: str
+    learned: str
+    said: Mapping[str, str]
+    joined: Joined
+
+    def __new__(
+        cls,
+        value: str,
+        states: tuple[str, ...] = (),
+        wanted: tuple[str, ...] = (),
+        wrong: str = '',
+        named: str = '',
+        learned: str = '',
+        said: Mapping[str, str] = _PLAINLY,
+        joined: Joined = Joined.BY_SPOT,
+    ) -> Kind:
+        """Make a member of its entry."""
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.states, member.wrong, member.named, member.learned = states, wrong, named, learned
+        member.wanted = (*wanted, USUAL) if learned else wanted
+        member.said, member.joined = said, joined
+        return member
+
+    def words(self, state: str, subject: str = '') -> str:
+        """Say a state of a thing, as 'door D1 is ajar'."""
+        thing = f'{self} {subject}' if subject else str(self)
+        return self.said.get(state, f'{{thing}} is {state}').format(thing=thing)
 
 
 @dataclass(frozen=True)
@@ -45,7 +134,7 @@ class Observation:
 
     Attributes:
         kind: What it is about.
-        state: What was seen of it, of `STATES`.
+        state: What was seen of it, of its kind's states.
         place: The place it is in.
         subject: Which door or marker; empty where the position tells.
         position: Where, map frame, metres; None where that is not known.
@@ -77,8 +166,8 @@ class Observation:
     sensor: str = ''
 
     def __post_init__(self) -> None:
-        if self.state not in STATES[self.kind]:
-            expected = ', '.join(STATES[self.kind])
+        if self.state not in self.kind.states:
+            expected = ', '.join(self.kind.states)
             raise ValueError(f'{self.kind} {self.state!r}: expected one of {expected}')
         numbers = (
             self.confidence,
@@ -110,12 +199,4 @@ class Observation:
     def words(self) -> str:
         """Return it in words, as 'door D1 is ajar in C1'."""
         where = f' in {self.place}' if self.place else ''
-        if self.state == 'nobody':
-            return f'nobody is{where}'
-        if self.state == 'nobody walks':
-            return f'nobody walks{where}'
-        subject = f' {self.subject}' if self.subject else ''
-        verb = {'seen': 'was', 'appeared': 'has', 'missing': 'is', 'moved': 'was'}.get(
-            self.state, 'is'
-        )
-        return f'{self.kind}{subject} {verb} {self.state}{where}'
+        return f'{self.kind.words(self.state, self.subject)}{where}'

@@ -36,7 +36,7 @@ from pathlib import Path
 from typing import Any
 
 from indoor_watch.habits import UNUSUAL_BELOW
-from indoor_watch.observations import Kind, Observation
+from indoor_watch.observations import USUAL, Kind, Observation
 from patrol_policy.hours import WeeklyHours
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import EntryError, read_table
@@ -50,25 +50,6 @@ class Level(IntEnum):
     ALERT = 3
 
 
-USUAL = 'usual'
-"""Wanted where a person leaves it to what the robot has learned of this hour."""
-NORMAL: Mapping[Kind, tuple[str, ...]] = {
-    Kind.DOOR: ('open', 'closed', 'ajar', USUAL),
-    Kind.OBJECT: ('none',),
-    Kind.MARKER: ('here',),
-    Kind.PERSON: ('nobody', USUAL),
-    Kind.LIGHT: ('on', 'off', USUAL),
-    Kind.VIEW: ('clear',),
-    Kind.WAY: ('free',),
-}
-"""What a rule may ask for, by kind."""
-NAMED: Mapping[Kind, str] = {
-    Kind.DOOR: "the name of a door, or 'all'",
-    Kind.MARKER: "the number that a marker shows, or 'all'",
-}
-"""Kinds of things with names, and what names one; of the others the rule's first line says how it
-is to be.
-"""
 ALL = ('all', 'any', 'every')
 KEYS = ('is', 'places', 'hours', 'persistence', 'severity', 'confidence')
 ALWAYS = WeeklyHours.parse('daily 00:00-24:00')
@@ -81,7 +62,7 @@ class WatchRule:
     Attributes:
         kind: What it is about.
         subject: Which door or marker; empty: all.
-        wanted: How it is to be, of `NORMAL`.
+        wanted: How it is to be, of what its kind may be wanted to be.
         places: Where; empty: everywhere.
         hours: When.
         looks: In how many looks it must have been seen otherwise.
@@ -126,16 +107,10 @@ class WatchRule:
         """Say the rule back."""
         where = f' in {_listed(self.places)}' if self.places else ''
         when = 'always' if self.hours == ALWAYS else f'in the hours {self.hours.text}'
-        subject = f' {self.subject}' if self.subject else ''
-        wrong = {
-            Kind.DOOR: f'door{subject or "s"} not {self.wanted}',
-            Kind.OBJECT: 'anything that was not there before',
-            Kind.MARKER: f'marker{subject or "s"} not where it hangs',
-            Kind.PERSON: 'a person, or nobody,' if self.wanted == USUAL else 'a person',
-            Kind.LIGHT: f'the light not {self.wanted}',
-            Kind.VIEW: 'a view that changed or is blocked',
-            Kind.WAY: 'a way that is not free',
-        }[self.kind]
+        subject = f' {self.subject}' if self.subject else 's'
+        wrong = self.kind.wrong.format(subject=subject, wanted=self.wanted)
+        if self.kind == Kind.PERSON and self.wanted == USUAL:
+            wrong = 'a person, or nobody,'
         if self.wanted == USUAL:
             wrong = f'{wrong.removesuffix(" not usual")} as is unusual for the hour'
         lasting = ''
@@ -214,23 +189,23 @@ def rule_from(
 
 def _wanted(kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]:
     value, wanted = str(entry[kind]), entry.get('is')
-    if kind in NAMED:
+    if kind.named:
         subject = '' if value in ALL else value
         if entry[kind] is None or isinstance(entry[kind], list | Mapping):
-            raise ValueError(f'{kind}: got {entry[kind]!r}, expected {NAMED[kind]}')
+            raise ValueError(f'{kind}: got {entry[kind]!r}, expected {kind.named}')
         if kind == Kind.MARKER and subject and not re.fullmatch(r'\d{1,9}', subject, re.ASCII):
-            raise ValueError(f'{kind}: got {value!r}, expected {NAMED[kind]}')
+            raise ValueError(f'{kind}: got {value!r}, expected {kind.named}')
         wanted = (
-            str(wanted) if wanted is not None else NORMAL[kind][0] if len(NORMAL[kind]) == 1 else ''
+            str(wanted) if wanted is not None else kind.wanted[0] if len(kind.wanted) == 1 else ''
         )
     else:
         if wanted is not None:
-            raise ValueError(f"{kind} takes no 'is', expected '{kind}: {NORMAL[kind][0]}'")
+            raise ValueError(f"{kind} takes no 'is', expected '{kind}: {kind.wanted[0]}'")
         # YAML reads on and off as truth values.
         subject, wanted = '', {'True': 'on', 'False': 'off'}.get(value, value)
-    if wanted not in NORMAL[kind]:
+    if wanted not in kind.wanted:
         key = f'{kind} {subject or ""}'.rstrip()
-        raise ValueError(f'{key}: got {wanted!r}, expected {nearest(str(wanted), NORMAL[kind])}')
+        raise ValueError(f'{key}: got {wanted!r}, expected {nearest(str(wanted), kind.wanted)}')
     return subject, wanted
 
 

@@ -225,4 +225,6 @@ def _spot(points: Sequence[Point]) -> Spot | None:
 
 
 def _time(seconds: float) -> Time:
-    return stamp_from(max(0, round(1e9 * seconds)))
+    # Apart: a float of all the nanoseconds since 1970 is good to 256 of them.
+    part, whole = math.modf(max(0.0, seconds))
+    return stamp_from(1_000_000_000 * int(whole) + round(1e9 * part))
