@@ -113,8 +113,8 @@ def test_all_nodes_in_one_process(launch, clock):
     mission = launch('--mode', 'RANDOM', '--composed')
     process = process_of(mission, 'composed')
     mission.until(r'robot_behavior +\| arrived in')
-    # The recorder looks on from a process of its own.
-    assert sum('started' in line for line in mission.lines) == 2
+    # The recorder and the alarm look on from processes of their own.
+    assert sum('started' in line for line in mission.lines) == 3
     code, seconds = mission.end(signal.SIGTERM)
     assert code == 0
     assert seconds < 60
