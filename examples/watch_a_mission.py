@@ -1,4 +1,4 @@
-"""Watch a mission: build states as a feed does, and show what changed and the last one.
+"""Watch a mission: build states as a subscriber does, and show what changed and the last one.
 
 No ROS is started. On a robot `MissionSubscriber` makes the states from topics; here a few lines
 of Python play the robot. The terminal view, the page and the recording all show such states.
@@ -43,8 +43,8 @@ def main() -> None:
         battery=82.0,
         threshold=50.0,
     )
-    framer = PatchMaker()
-    framer.patch(state)
+    patches = PatchMaker()
+    patches.patch(state)
     reason = 'B has waited 60 s, longer than the threshold of 50 s'
     decision = Decision(100.0, 'A', 'B', 'B', 'URGENT', 'tour', reason, {'B': 60.0, 'A': 2.0})
     moving = Status(100.0, 'surveillance', 'MOVE_TO_NEXT_ROOM', 'A', 'B', False, '', ())
@@ -64,7 +64,7 @@ def main() -> None:
         state, told = follow(state, new, at=start + second)
         for change in told:
             print(f'{second:3d} s      {change.text} {change.detail}'.rstrip())
-        patch = framer.patch(state)
+        patch = patches.patch(state)
         print(f'          the page gets {", ".join(patch) or "nothing"}')
     console = Console(width=80, height=20, highlight=False)
     console.print(MissionView(state, whole=False))

@@ -371,9 +371,9 @@ def answer(
         return [Reply('', ends=True)]
     if command.name == STATUS.name:
         known = [Reply(said)] if (said := mission.figures()) else []
-        return [*known, *(_told(actions, controller, line) for controller in CONTROLLED)]
+        return [*known, *(_sent(actions, controller, line) for controller in CONTROLLED)]
     if command.name in _CONTROLLER_OF:
-        return [_told(actions, _CONTROLLER_OF[command.name], line)]
+        return [_sent(actions, _CONTROLLER_OF[command.name], line)]
     try:
         if command.name in (_ROBOTS.name, _ROBOT.name, _ALL.name):
             return [Reply(_of_fleet(command, mission))]
@@ -396,10 +396,10 @@ def _of_fleet(command: ParsedCommand, fleet: ConsoleMission) -> str:
 def _exit(name: str, actions: MissionActions) -> Reply:
     if name not in CONTROLLED:
         return Reply(f'exit {name}: expected {nearest(name, CONTROLLED)}')
-    return _told(actions, name, EXIT.name)
+    return _sent(actions, name, EXIT.name)
 
 
-def _told(actions: MissionActions, controller: str, line: str) -> Reply:
+def _sent(actions: MissionActions, controller: str, line: str) -> Reply:
     try:
         return Reply(actions.command(controller, line), controller)
     except UnavailableError as error:

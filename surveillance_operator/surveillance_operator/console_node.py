@@ -39,7 +39,7 @@ from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 
-FEED_PERIOD = 0.5
+STATE_PERIOD = 0.5
 """Seconds between two looks at what the status line shows."""
 
 
@@ -67,7 +67,7 @@ class ConsoleNode(PatrolNode):
         self._left_out = 0
         self._met: set[str] = set()
         self._subscriber = FleetSubscriber(
-            self, FEED_PERIOD, lambda name, _new, _told: self._meet(name)
+            self, STATE_PERIOD, lambda name, _new, _told: self._meet(name)
         )
         self._actions = FleetActions(self, lambda: self._subscriber.robots, timeout)
         self._meet('')
@@ -108,7 +108,7 @@ class ConsoleNode(PatrolNode):
 
     def tell_all(self, word: str) -> str:
         """Have all robots do something."""
-        return self._actions.told(ALL, WORDS[word][1]).replace('; ', '\n')
+        return self._actions.carry_out(ALL, WORDS[word][1]).replace('; ', '\n')
 
     def _meet(self, robot: str) -> None:
         """Hear what the controllers of a robot announce."""
@@ -177,8 +177,8 @@ class ConsoleNode(PatrolNode):
         """Return why the robot goes where it goes."""
         deadline = time.monotonic() + self._timeout
         while (said := reason(self._subscriber.state(self.robot))) is None:
-            # The feed of a console that was just opened has not heard of it yet.
-            if time.monotonic() > deadline or self.stopping.wait(FEED_PERIOD):
+            # The subscriber of a console that was just opened has not heard of it yet.
+            if time.monotonic() > deadline or self.stopping.wait(STATE_PERIOD):
                 return 'no decision yet'
         return '\n'.join(said)
 

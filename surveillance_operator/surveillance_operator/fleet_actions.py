@@ -70,7 +70,7 @@ class FleetActions:
                 )
             return self._of[robot]
 
-    def told(self, robot: str, do: Do) -> str:
+    def carry_out(self, robot: str, do: Do) -> str:
         """Have a robot do something, or all of them at once; return what came of it.
 
         Args:

@@ -54,15 +54,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         if options.word is not None and options.robot != ALL:
             names = [options.robot]
             return carry_out(options.word, names, FleetActions(node, lambda: names, TIMEOUT))
-        feed = FleetSubscriber(node, PERIOD)
+        subscriber = FleetSubscriber(node, PERIOD)
         time.sleep(LISTEN)  # until each robot had time to say a word
-        if feed.robots == ('',):
+        if subscriber.robots == ('',):
             print('no robot of a fleet was heard: expected a run with --robots')
             return 1
         if options.word is not None:
-            actions = FleetActions(node, lambda: feed.robots, TIMEOUT)
-            return carry_out(options.word, feed.robots, actions)
-        for line in fleet_lines(feed.see()):
+            actions = FleetActions(node, lambda: subscriber.robots, TIMEOUT)
+            return carry_out(options.word, subscriber.robots, actions)
+        for line in fleet_lines(subscriber.see()):
             print(line)
         return 0
     finally:

@@ -132,18 +132,18 @@ class MissionActions:
         """Open or close a door: a simulated one, or else as the map has it."""
         wanted: dict[str, Any] = {'door': _name(door), 'open': bool(is_open)}
         try:
-            return self._told('simulation/set_door', **wanted)
+            return self._request('simulation/set_door', **wanted)
         except UnavailableError:
-            return self._told('ontology_map/set_door', **wanted)
+            return self._request('ontology_map/set_door', **wanted)
 
     def place_obstacle(self, name: str, x: float, y: float, radius: float) -> str:
         """Put a cylinder in the simulated robot's way, metres."""
         at = {'x': _number('x', x), 'y': _number('y', y), 'radius': _number('radius', radius)}
-        return self._told('simulation/place_obstacle', name=_name(name), **at)
+        return self._request('simulation/place_obstacle', name=_name(name), **at)
 
     def remove_obstacle(self, name: str) -> str:
         """Take an obstacle away."""
-        return self._told('simulation/remove_obstacle', name=_name(name))
+        return self._request('simulation/remove_obstacle', name=_name(name))
 
     def stage(self, line: str) -> str:
         """Change the simulated place by a line such as `door D1 ajar 30`."""
@@ -155,11 +155,11 @@ class MissionActions:
 
     def drain_battery(self, percent: float) -> str:
         """Take charge out of the simulated battery."""
-        return self._told('simulation/drain_battery', percent=_number('percent', percent))
+        return self._request('simulation/drain_battery', percent=_number('percent', percent))
 
     def add_room(self, name: str, x: float, y: float, doors: Sequence[str]) -> str:
         """Add a place to the map and the ontology."""
-        return self._told(
+        return self._request(
             'ontology_map/add_room',
             room_name=_name(name),
             position=Point(x=_number('x', x), y=_number('y', y)),
@@ -168,7 +168,7 @@ class MissionActions:
 
     def remove_room(self, name: str) -> str:
         """Remove a place from the map and the ontology."""
-        return self._told('ontology_map/remove_room', room_name=_name(name))
+        return self._request('ontology_map/remove_room', room_name=_name(name))
 
     def set_place(self, described: Mapping[str, Any]) -> str:
         """Have the mission go on in a place that was changed; its parameters as in its file."""
@@ -179,7 +179,7 @@ class MissionActions:
 
     def go_to(self, place: str) -> str:
         """Send the robot to a place next; an empty one calls it home."""
-        return self._told('go_to', place=_name(place) if place else '')
+        return self._request('go_to', place=_name(place) if place else '')
 
     def why_not(self, place: str) -> tuple[str, list[str]]:
         """Return why the robot would not go to a place now, and the premises of that."""
@@ -202,14 +202,14 @@ class MissionActions:
 
     def approve(self, outcome: str = '') -> str:
         """Have the transition be made that waits for a person, or that of another outcome."""
-        self._told(f'{BEHAVIOUR}/fsm/approve', outcome=str(outcome))
+        self._request(f'{BEHAVIOUR}/fsm/approve', outcome=str(outcome))
         return f'going on with {outcome}' if outcome else 'approved'
 
     def set_autonomy(self, level: str) -> str:
         """Set how much the machine does by itself: off, low, high or full."""
         if level not in AUTONOMY:
             raise ValueError(f'{level!r}: expected {nearest(level, AUTONOMY)}')
-        self._told(f'{BEHAVIOUR}/fsm/set_autonomy', level=AUTONOMY.index(level))
+        self._request(f'{BEHAVIOUR}/fsm/set_autonomy', level=AUTONOMY.index(level))
         return f'autonomy: {level}'
 
     def stop(self, on: bool) -> str:
@@ -269,7 +269,7 @@ class MissionActions:
         number = getattr(MarkerRoutine.Request, str(pose).upper(), None)
         if not isinstance(number, int):
             raise ValueError(f'{pose!r}: expected left, home, right, back or stop')
-        return self._told('move_arm', ARM_SECONDS, pos=number)
+        return self._request('move_arm', ARM_SECONDS, pos=number)
 
     def command(self, controller: str, line: str) -> str:
         """Give a controller one of its console's commands: the answers of mode MANUAL."""
@@ -321,7 +321,7 @@ class MissionActions:
         except ArmorServiceInternalError as error:
             raise ValueError(str(error)) from None
 
-    def _told(self, service: str, timeout: float | None = None, **fields: Any) -> str:
+    def _request(self, service: str, timeout: float | None = None, **fields: Any) -> str:
         answer = self._call(service, timeout, **fields)
         if not answer.success:
             raise ValueError(answer.message or f'{service} refused')

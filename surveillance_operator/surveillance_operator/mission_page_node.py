@@ -237,7 +237,7 @@ class MissionPage(PatrolNode):
 
         def act(robot: str = '', **fields: Any) -> str:
             inspect.signature(do).bind(None, **fields)
-            return self._actions.told(robot, lambda actions: do(actions, **fields))
+            return self._actions.carry_out(robot, lambda actions: do(actions, **fields))
 
         return act
 
@@ -245,7 +245,7 @@ class MissionPage(PatrolNode):
         """Have one robot or all do what a word says."""
         if word not in WORDS:
             raise ValueError(f'{word!r}: expected {nearest(word, WORDS)}')
-        return self._actions.told(robot, WORDS[word][1])
+        return self._actions.carry_out(robot, WORDS[word][1])
 
 
 class RoomChanges:

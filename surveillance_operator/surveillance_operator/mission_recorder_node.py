@@ -39,7 +39,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.run_files import RECORDING, TIMELINE
 
-DRAIN_PERIOD, SEAL_PERIOD, FEED_PERIOD = 0.15, 0.6, 0.4
+DRAIN_PERIOD, SEAL_PERIOD, STATE_PERIOD = 0.15, 0.6, 0.4
 """Seconds between two looks at all queues, two chunks, and two lines of the time line."""
 PRUNE_PERIOD = 60.0
 RETRY_PERIOD = 3.0
@@ -97,7 +97,7 @@ class MissionRecorder(PatrolNode):
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._unknown: set[str] = set()
-        self._subscriber = MissionSubscriber(self, FEED_PERIOD)
+        self._subscriber = MissionSubscriber(self, STATE_PERIOD)
         self.spawn(self._record, 'recording')
         if path.name == RECORDING:
             self.spawn(self._repair, 'repair')
@@ -137,7 +137,7 @@ class MissionRecorder(PatrolNode):
         self._drain()
         if now >= self._next_line:
             self._timeline.add(self._subscriber.see(), time.time())
-            self._next_line = now + FEED_PERIOD
+            self._next_line = now + STATE_PERIOD
         if now >= self._next_seal:
             self._bag.seal()
             self._next_seal = now + SEAL_PERIOD

@@ -76,7 +76,7 @@ def test_a_node_that_reports_no_more_is_stale(graph: Any, monkeypatch: pytest.Mo
     heard = graph.listen(DiagnosticArray, '/diagnostics')
     described = graph.listen(String, 'robot_description', STATE_QOS)
     graph.add(MissionMarkers)
-    listeners = len([heard, 'the feed of the markers'])
+    listeners = len([heard, 'the subscriber of the markers'])
     graph.until(lambda: node_speaks.get_subscription_count() == listeners)
     terminal = DiagnosticStatus(name='robot7/console', message='up')  # its end is no fault
     node_speaks.publish(DiagnosticArray(status=[terminal, status]))

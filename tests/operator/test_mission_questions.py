@@ -25,21 +25,23 @@ from tests.operator.peers import PLACE, Planner
 def test_a_place_that_is_changed_brings_no_robot_back_that_was_left(graph: Any) -> None:
     """The page showed the robots of an earlier fleet again after an edit of the place."""
     heard: list[MissionState] = []
-    feed = MissionSubscriber(graph.node, 0.05, lambda new, _told: heard.append(new), robot='anna')
+    subscriber = MissionSubscriber(
+        graph.node, 0.05, lambda new, _told: heard.append(new), robot='anna'
+    )
     sender = graph.node.create_publisher(String, 'place', STATE_QOS)
 
     def changed(x: float) -> None:
         sender.publish(String(data=description_text({'doors': {'D1': [x, 0.0, x, 1.0]}})))
 
     changed(1.0)
-    graph.until(lambda: 'D1' in feed.state.place.door_lines)
+    graph.until(lambda: 'D1' in subscriber.state.place.door_lines)
     read: list[object] = []
     follow_place(graph.node, read.append)  # made later, and so told later
-    feed.leave()
-    before, told = feed.state.place.door_lines, len(heard)
+    subscriber.leave()
+    before, told = subscriber.state.place.door_lines, len(heard)
     changed(2.0)
     graph.until(lambda: any('2.0' in str(each) for each in read))
-    assert feed.state.place.door_lines == before
+    assert subscriber.state.place.door_lines == before
     assert len(heard) == told
 
 

@@ -90,25 +90,25 @@ def test_a_part_is_computed_anew_when_a_field_that_it_reads_changes() -> None:
 
 
 def test_a_patch_holds_what_changed_alone() -> None:
-    framer = PatchMaker()
-    first = framer.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
+    patches = PatchMaker()
+    first = patches.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
     assert first['brief'] == 'battery 50 %'
     assert (
-        framer.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
+        patches.patch(MissionState().having(battery=50.0, decision=DECISION, decision_number=1))
         == {}
     )
-    after = framer.patch(MissionState().having(battery=49.0, decision=DECISION, decision_number=1))
+    after = patches.patch(MissionState().having(battery=49.0, decision=DECISION, decision_number=1))
     assert after.keys() == {'brief', 'figures'}
     assert after['brief'] == 'battery 49 %'
 
 
 def test_a_robot_that_waits_for_help_has_no_plan() -> None:
-    framer = PatchMaker()
+    patches = PatchMaker()
     moving = Status(0.0, 'm', 'MOVE', 'A', 'B', False, '', ())
     state = MissionState().having(status=moving, plan=np.array([(0.0, 0.0), (1.0, 0.0)]))
-    assert framer.patch(state)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
+    assert patches.patch(state)['plan'] == [[0.0, 0.0], [1.0, 0.0]]
     stuck = state.having(status=replace(moving, waiting_for_help=True))
-    assert framer.patch(stuck)['plan'] == []
+    assert patches.patch(stuck)['plan'] == []
 
 
 def test_one_time_line_names_each_robot_and_tells_of_the_place_once() -> None:

@@ -42,7 +42,7 @@ class _Robot:
     """What viewers are shown of one robot."""
 
     def __init__(self) -> None:
-        self.framer = PatchMaker()
+        self.patches = PatchMaker()
         self.state: MissionState | None = None
         self.now = 0.0
         self.texts: Texts = {}
@@ -195,10 +195,10 @@ class Broadcaster:
         if robot is None or robot.state is None:
             return
         watched = name in self._waiting.values()
-        patch = robot.framer.patch(robot.state, None if watched else GLANCE)
+        patch = robot.patches.patch(robot.state, None if watched else GLANCE)
         self._accept(name, patch)
         if anew:
-            robot.trail = robot.framer.whole()['trail']
+            robot.trail = robot.patches.whole()['trail']
 
     def _accept(self, name: str, parts: Parts) -> None:
         robot = self._robots[name]
