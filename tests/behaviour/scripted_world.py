@@ -23,7 +23,7 @@ from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
 from surveillance_ontology.robot_ontology import Snapshot
-from tests.seven_rooms import SEVEN_ROOMS
+from tests.places import SEVEN_ROOMS
 
 POSITIONS = {
     'R1': (10.0, 5.0, 0.0),

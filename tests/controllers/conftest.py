@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any, TextIO
 
 import pytest
-import yaml
 
 from lidar_navigation.testing import Flat
-from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
+from surveillance_simulation.world.simulated_place import SimulatedPlace
+from tests import places
+from tests.places import seven_rooms_parameters
 
 
 class Operator:
@@ -62,14 +62,7 @@ def in_background() -> Iterator[Callable[[Callable[[], Any]], Callable[[], Any]]
 @pytest.fixture
 def seven_rooms() -> dict[str, Any]:
     """Provide the seven rooms' file as flat parameter overrides."""
-    file = Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml'
-    flat: dict[str, Any] = {}
-    for name, value in yaml.safe_load(file.read_text())['/**']['ros__parameters'].items():
-        if isinstance(value, dict):
-            flat.update({f'{name}.{key}': entry for key, entry in value.items()})
-        else:
-            flat[name] = value
-    return flat
+    return seven_rooms_parameters()
 
 
 @pytest.fixture
@@ -81,4 +74,4 @@ def flat() -> Flat:
 @pytest.fixture
 def seven_rooms_world() -> SimulatedPlace:
     """Provide the seven rooms, as simulated."""
-    return read_simulated_place(Path(__file__).parents[2] / 'config' / 'seven_rooms.yaml')
+    return places.seven_rooms()

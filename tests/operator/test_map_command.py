@@ -16,6 +16,7 @@ from floor_plans.drawing import Canvas, blend, draw_place
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator import map_command
 from surveillance_simulation.world.simulated_place import read_simulated_place
+from tests.places import seven_rooms
 
 pytestmark = pytest.mark.early
 
@@ -128,7 +129,7 @@ def test_the_names_of_places_end_before_their_bars(
 def test_ways_and_failures_come_from_the_record(record: Path) -> None:
     from surveillance_runtime import event_log
 
-    place = read_simulated_place(CONFIG / 'seven_rooms.yaml').plan.place
+    place = seven_rooms().plan.place
     run = map_command.run_of(event_log.read(record), place, 'run')
     assert run.planned == [
         [(5.0, 10.0), (10.0, 8.0)],
@@ -150,7 +151,7 @@ def test_a_room_that_was_added_during_the_run_keeps_nothing_from_being_drawn(
 ) -> None:
     from surveillance_runtime import event_log
 
-    place = read_simulated_place(CONFIG / 'seven_rooms.yaml').plan.place
+    place = seven_rooms().plan.place
     with MissionRecord(record) as mission:
         mission.write('map', 61.0, places=[*place.rooms, 'New'])
         way = [[5, 10], [4, 10], [3, 10]]

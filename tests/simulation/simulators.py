@@ -5,19 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from surveillance_simulation.simulator_node import Simulator
-
-from .places import TWO_ROOMS
-
-
-def flat(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Return nested parameters with dotted names and with numbers as ROS lists hold them."""
-    values: dict[str, Any] = {}
-    for name, value in parameters.items():
-        if isinstance(value, dict):
-            values |= {f'{name}.{entry}': each for entry, each in value.items()}
-        else:
-            values[name] = value
-    return values
+from tests.places import TWO_ROOMS, flat
 
 
 def simulator(graph: Any, **parameters: Any) -> Simulator:

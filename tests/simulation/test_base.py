@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_simulation.robot.base import PUSH_GAP, Base, BaseModel
-from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
-
-from .places import CONFIG, two_rooms
+from surveillance_simulation.world.simulated_place import SimulatedPlace
+from tests.places import seven_rooms, two_rooms
 
 DT = 0.05
 
@@ -137,8 +136,8 @@ def test_a_command_that_is_no_number_stops_it() -> None:
 
 
 @pytest.fixture(scope='module')
-def seven_rooms() -> SimulatedPlace:
-    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
+def crowded() -> SimulatedPlace:
+    world = seven_rooms()
     world.set_door('D7', False)
     world.place_obstacle('box', 6.0, 9.0, 0.3)
     return world
@@ -149,14 +148,14 @@ def seven_rooms() -> SimulatedPlace:
     st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-1.5, 1.5), st.integers(1, 60)), max_size=12)
 )
 def test_no_commands_ever_drive_it_into_something(
-    seven_rooms: SimulatedPlace, commands: list[tuple[float, float, int]]
+    crowded: SimulatedPlace, commands: list[tuple[float, float, int]]
 ) -> None:
-    base = Base(seven_rooms, seven_rooms.plan.start)
+    base = Base(crowded, crowded.plan.start)
     for speed, turn_speed, steps in commands:
         for _ in range(steps):
             base.command(speed, turn_speed)
             base.step(DT)
-            assert seven_rooms.clearance(*base.pose[:2]) >= base.model.radius
+            assert crowded.clearance(*base.pose[:2]) >= base.model.radius
 
 
 def test_a_base_begins_at_rest_with_nothing_behind_it_and_counts_its_way() -> None:

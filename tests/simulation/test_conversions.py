@@ -17,8 +17,7 @@ from surveillance_runtime.sensing.conversions import scan_from
 from surveillance_simulation import conversions
 from surveillance_simulation.camera.model import Camera
 from surveillance_simulation.robot.lidar import LidarModel
-
-from .places import two_rooms
+from tests.places import two_rooms
 
 STAMP = Time(sec=3, nanosec=5)
 

@@ -8,8 +8,7 @@ import pytest
 from surveillance_simulation.camera.lamps import LampLight
 from surveillance_simulation.camera.model import Array, Camera
 from surveillance_simulation.world.simulated_place import SimulatedPlace
-
-from .places import TWO_ROOMS
+from tests.places import TWO_ROOMS
 
 
 def looking_down(x: float, y: float) -> Array:

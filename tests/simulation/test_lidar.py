@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from surveillance_simulation.robot.lidar import LidarModel, scan
-from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
-
-from .places import CONFIG, two_rooms
+from surveillance_simulation.world.simulated_place import SimulatedPlace
+from tests.places import seven_rooms, two_rooms
 
 EXACT = LidarModel(noise=0.0)
 
@@ -58,7 +57,7 @@ def test_noise_is_repeatable_and_of_the_size_given() -> None:
 
 @pytest.fixture(scope='module')
 def furnished() -> SimulatedPlace:
-    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
+    world = seven_rooms()
     world.set_door('D5', False)
     world.place_obstacle('box', 10.0, 9.0, 0.3)
     return world

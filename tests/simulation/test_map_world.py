@@ -13,9 +13,8 @@ from strict_files.yaml_file import read_yaml_file
 from surveillance_simulation.robot.base import Base, BaseModel
 from surveillance_simulation.robot.lidar import LidarModel, scan
 from surveillance_simulation.world.people import People, PeopleModel
-from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
-
-from .places import CONFIG
+from surveillance_simulation.world.simulated_place import SimulatedPlace
+from tests.places import CONFIG, seven_rooms
 
 CELL = 0.05
 
@@ -24,7 +23,7 @@ CELL = 0.05
 def worlds(tmp_path_factory: pytest.TempPathFactory) -> tuple[SimulatedPlace, SimulatedPlace]:
     """Return the seven rooms by their walls, and by a map that was drawn of them."""
     folder = tmp_path_factory.mktemp('map')
-    by_walls = read_simulated_place(CONFIG / 'seven_rooms.yaml')
+    by_walls = seven_rooms()
     grid = by_walls.plan.grid(CELL)
     write_map(folder / 'rooms.yaml', grid.cells[::-1], CELL, (*grid.origin, 0.0))
     given = dict(read_yaml_file(CONFIG / 'seven_rooms.yaml').values['/**']['ros__parameters'])

@@ -13,8 +13,7 @@ from surveillance_simulation.camera.model import Camera, Conditions, expose
 from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.world.simulated_place import read_simulated_place
-
-from .places import CONFIG, camera_pose, two_rooms
+from tests.places import CONFIG, camera_pose, two_rooms
 
 CLEAN = Conditions(noise=0.0, blur=0.0)
 

@@ -10,9 +10,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel, _Ways
-from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
-
-from .places import CONFIG, two_rooms
+from surveillance_simulation.world.simulated_place import SimulatedPlace
+from tests.places import seven_rooms, two_rooms
 
 FAR_AWAY = (100.0, 100.0)
 
@@ -22,7 +21,7 @@ def people_in(world: SimulatedPlace, seed: int = 1, **model: object) -> People:
 
 
 def test_they_walk_from_room_to_room_and_through_no_wall() -> None:
-    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
+    world = seven_rooms()
     people = people_in(world, count=3)
     before, entered, walked = people.discs, set(), 0.0
     for _ in range(2400):

@@ -14,8 +14,7 @@ from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.lidar import LidarModel
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.simulated_place import SimulatedPlace
-
-from .places import changed, two_rooms
+from tests.places import changed, two_rooms
 
 pytest.importorskip('mujoco')
 

@@ -18,8 +18,7 @@ from surveillance_simulation.camera.scene import thing_faces
 from surveillance_simulation.world import textures
 from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 from surveillance_simulation.world.things import barrel, box
-
-from .places import CONFIG, camera_pose, changed, two_rooms
+from tests.places import CONFIG, camera_pose, changed, two_rooms
 
 CLEAN = Conditions(noise=0.0, blur=0.0)
 CAMERA = Camera.from_field_of_view(640, 480, math.radians(60))

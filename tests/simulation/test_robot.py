@@ -13,9 +13,8 @@ from lidar_navigation import Drive, DriveState, GridPlanner, Navigator, NoPathEr
 from lidar_navigation.geometry import Scan
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import PeopleModel
-from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
-
-from .places import CONFIG
+from surveillance_simulation.world.simulated_place import SimulatedPlace
+from tests.places import CONFIG, seven_rooms
 
 sys.path.insert(0, str(CONFIG.parent / 'benchmarks'))
 
@@ -25,7 +24,7 @@ pytestmark = pytest.mark.early
 
 RADIUS = 0.22
 DOORS = ('D1', 'D2', 'D3', 'D4', 'D5', 'D6', 'D7')
-PLAN = read_simulated_place(CONFIG / 'seven_rooms.yaml').plan
+PLAN = seven_rooms().plan
 points = st.tuples(st.floats(2.0, 18.0), st.floats(2.0, 18.0))
 
 

@@ -16,8 +16,8 @@ from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.robot.robots import Robots
 from surveillance_simulation.simulator_node import Simulator
+from tests.places import TWO_ROOMS, two_rooms
 
-from .places import TWO_ROOMS, two_rooms
 from .test_simulator_node import flat
 
 

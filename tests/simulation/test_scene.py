@@ -14,8 +14,7 @@ from surveillance_simulation.world import textures
 from surveillance_simulation.world.figures import person
 from surveillance_simulation.world.simulated_place import SimulatedPlace
 from surveillance_simulation.world.things import Shape, barrel, box, chair
-
-from .places import camera_pose, changed, two_rooms
+from tests.places import camera_pose, changed, two_rooms
 
 Key = tuple[str, float, float, float]
 

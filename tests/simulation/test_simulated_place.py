@@ -12,8 +12,7 @@ from benchmarks import regular_places
 from floor_plans import Marker, PlaceError, occupancy_grid, writing
 from strict_files.files import FileError
 from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
-
-from .places import CONFIG, changed, two_rooms
+from tests.places import CONFIG, changed, seven_rooms, two_rooms
 
 
 @pytest.mark.parametrize('name', ['seven_rooms', 'patrol_world', 'office'])
@@ -176,7 +175,7 @@ def test_the_map_shows_walls_as_occupied_and_doors_as_free() -> None:
 
 
 def test_free_cells_of_the_map_are_free_in_the_world() -> None:
-    world = read_simulated_place(CONFIG / 'seven_rooms.yaml')
+    world = seven_rooms()
     grid = world.plan.grid()
     rows, columns = np.nonzero(grid.cells == occupancy_grid.FREE)
     for row, column in list(zip(rows, columns, strict=True))[::97]:

@@ -28,9 +28,9 @@ from surveillance_runtime.conversions import pose_from, seconds_of
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS, STATE_QOS
 from surveillance_simulation.simulator_node import Simulator
+from tests.places import changed, flat
 
-from .places import changed
-from .simulators import ask, flat, simulator
+from .simulators import ask, simulator
 
 
 def test_a_killed_process_loses_neither_pose_nor_time_nor_doors(graph: Any, tmp_path: Path) -> None:

@@ -17,8 +17,7 @@ from surveillance_simulation.camera.mujoco_rendering import MujocoRenderer
 from surveillance_simulation.camera.rendering import Renderer
 from surveillance_simulation.robot.robot import PHYSICS_STEP, Robot
 from surveillance_simulation.staging import Happening, Stage, Times, check_script, read_script
-
-from .places import camera_pose, two_rooms
+from tests.places import camera_pose, two_rooms
 
 CAMERA = Camera.from_field_of_view(160, 120)
 EASTWARD = camera_pose(0.4, 1.0, 0.9, 0.0, -0.2)

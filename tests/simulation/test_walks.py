@@ -10,8 +10,7 @@ from floor_plans import PlaceError
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.simulated_place import SimulatedPlace
 from surveillance_simulation.world.walks import Walks
-
-from .places import two_rooms
+from tests.places import two_rooms
 
 NOBODY: list[tuple[float, float]] = []
 

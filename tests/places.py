@@ -1,4 +1,4 @@
-"""Places for the tests of the simulation."""
+"""Places that tests of several packages share."""
 
 from __future__ import annotations
 
@@ -9,10 +9,22 @@ from typing import Any
 
 import numpy as np
 
+from strict_files.yaml_file import read_yaml_file
 from surveillance_simulation.camera.model import Array
-from surveillance_simulation.world.simulated_place import SimulatedPlace
+from surveillance_simulation.world.simulated_place import SimulatedPlace, read_simulated_place
 
-CONFIG = Path(__file__).parents[2] / 'config'
+CONFIG = Path(__file__).parents[1] / 'config'
+SEVEN_ROOMS_FILE = CONFIG / 'seven_rooms.yaml'
+SEVEN_ROOMS = {
+    'R1': ['D1'],
+    'R2': ['D2'],
+    'R3': ['D3'],
+    'R4': ['D4'],
+    'E': ['D6', 'D7'],
+    'C1': ['D1', 'D2', 'D5', 'D6'],
+    'C2': ['D3', 'D4', 'D5', 'D7'],
+}
+"""The seven rooms of the assignment: each room with its doors."""
 
 TWO_ROOMS: dict[str, Any] = {
     'map': {'A': ['D'], 'B': ['D']},
@@ -74,3 +86,24 @@ def camera_pose(
     pose[:3, 2] = forward
     pose[:3, 3] = (x, y, z)
     return pose
+
+
+def flat(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Return nested parameters with dotted names and with numbers as ROS lists hold them."""
+    values: dict[str, Any] = {}
+    for name, value in parameters.items():
+        if isinstance(value, dict):
+            values |= {f'{name}.{entry}': each for entry, each in value.items()}
+        else:
+            values[name] = value
+    return values
+
+
+def seven_rooms() -> SimulatedPlace:
+    """Return the seven rooms, as simulated."""
+    return read_simulated_place(SEVEN_ROOMS_FILE)
+
+
+def seven_rooms_parameters() -> dict[str, Any]:
+    """Return the seven rooms' file as flat parameter overrides."""
+    return flat(read_yaml_file(SEVEN_ROOMS_FILE).values['/**']['ros__parameters'])
