@@ -147,11 +147,11 @@ def close(folder: Path, options: argparse.Namespace, config: Path) -> int:
     radius = profile_of(config, wanted_run(options)).profile.body.reach
     request = ImportRequest(options.out, place_of(options.out), radius, force=True)
     try:
-        lines = import_place(request)
+        report = import_place(request)
     except ValueError as error:
         print(f'{PROGRAM}: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
-    print('\n'.join(lines))
+    print(report)
     patrol = [*COMMAND, '--mode', options.mode or DEFAULT_MODE]
     if options.mode == 'ROBOT' or options.robot != Run().robot:
         patrol += ['--robot', options.robot]

@@ -22,7 +22,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         source, place = Path(folder) / 'flat.yaml', Path(folder) / 'place.yaml'
         write_map(source, cells, 0.05, (0.0, 0.0, 0.0))
-        print(import_place(ImportRequest(source, place))[0].replace(f'{folder}/', ''))
+        print(import_place(ImportRequest(source, place)).found)
         plan = read_place(place).plan
         rooms = RoomMap(plan)
         for name, mask in rooms.masks().items():

@@ -54,7 +54,7 @@ def main(folder: Path = Path('floor_plans_demo')) -> None:
 
     print('2. Its rooms and doors are found:')
     place = folder / 'place.yaml'
-    for line in import_place(ImportRequest(folder / 'map.yaml', place, force=True)):
+    for line in import_place(ImportRequest(folder / 'map.yaml', place, force=True)).lines:
         print('  ', line)
 
     print('3. Which room is where:')

@@ -28,6 +28,7 @@ _ROOM, _CORRIDOR, _HOME = '#f6ecd9', '#e3ebf3', '#dff0dc'
 _WALL, _LEAF, _ALARM = '#3a4350', '#b08a57', '#c0392b'
 _GRAPH, _SIGN, _SIGN_HOME = '#7fa3c7', '#2c5d8f', '#2f8a4c'
 _DRIVEN, _PLANNED, _CALM, _LATE = '#14717f', '#8a7fb8', '#fdf9f0', '#f2b287'
+_ASIDE = ('#e4e8ec', '#f3c6c0')
 _BARRED, _SLOW = '#c0392b', '#d08a1d'
 _LONGEST_SIDE = 1180.0
 _PANEL = 250
@@ -61,7 +62,11 @@ class DrivenRun:
 
 
 def draw_place(
-    plan: FloorPlan, title: str, facts: str, run: DrivenRun | None = None
+    plan: FloorPlan,
+    title: str,
+    facts: str,
+    run: DrivenRun | None = None,
+    aside: Mapping[str, npt.NDArray[np.bool_]] | None = None,
 ) -> Image.Image:
     """Return the picture of a place.
 
@@ -70,6 +75,7 @@ def draw_place(
         title: Its name.
         facts: One line about it.
         run: A run through it, if there was one.
+        aside: Cells of the place's map that are no part of it, by the word for the legend.
     """
     west, south, east, north = plan.bounds
     scale = min(64.0, _LONGEST_SIDE / max(east - west, north - south))
@@ -81,6 +87,7 @@ def draw_place(
     canvas.text((40, 58), facts if run is None else run.summary, 15, _SOFT)
     picture = _Picture(canvas, plan)
     picture.floors(run)
+    picture.set_aside(aside or {})
     if run is None:
         picture.graph()
     picture.zones()
@@ -107,6 +114,7 @@ class _Picture:
         self._regions = RoomMap(plan)
         self._plan = plan
         self._place = plan.place
+        self._aside: dict[str, str] = {}
         self._size = min(15.0, max(9.0, canvas.scale / 3.4))
 
     def floors(self, run: DrivenRun | None) -> None:
@@ -141,6 +149,17 @@ class _Picture:
                 # The outline runs through the middles of the outermost cells.
                 width = 2 * grid.resolution * self._canvas.scale
                 self._canvas.line([*edge, edge[0]], colour, width)
+
+    def set_aside(self, aside: Mapping[str, npt.NDArray[np.bool_]]) -> None:
+        """Draw what is no part of the place."""
+        if self._plan.map is None or not aside:
+            return
+        self._aside = dict(zip(aside, _ASIDE, strict=False))
+        grid = self._plan.map.grid
+        which = np.zeros(grid.cells.shape, np.uint16)
+        for number, mask in enumerate(aside.values(), start=1):
+            which[mask] = number
+        self._canvas.raster(which, grid.origin, grid.resolution, list(self._aside.values()))
 
     def _floor_colour(self, name: str) -> str:
         if name in self._place.recharge_rooms:
@@ -307,6 +326,7 @@ class _Picture:
         entries = [(_ROOM, 'room'), (_CORRIDOR, 'corridor'), (_HOME, 'charging station')]
         if run is not None and run.waits:
             entries = [(_CALM, 'visited often'), (_LATE, 'waited longest')]
+        entries += [(colour, word) for word, colour in self._aside.items()]
         for colour, text in entries:
             canvas.box(x, y - 8, x + 16, y + 8, _SOFT)
             canvas.box(x + 1, y - 7, x + 15, y + 7, colour)

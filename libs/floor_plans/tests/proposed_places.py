@@ -112,7 +112,7 @@ def proposed(variant: str) -> list[str]:
     areas = np.bincount(rooms.labels.ravel(), minlength=rooms.rooms + 1)[1:]
     lines.append(f'cells: {_shown(areas.tolist())}')
     lines.append(f'corridors: {_shown(sorted(rooms.corridors))}')
-    lines.append(f'left out: {_shown(found.left_out)}')
+    lines.append(f'left out: {_shown([each.number for each in found.left_out if each.number])}')
     return lines
 
 

@@ -60,7 +60,7 @@ def import_dropped(
             if source.lower().endswith(_YAML) and not is_levels(contents[source]):
                 contents[source] = _with_its_picture(stage / source, contents)
                 (stage / source).write_bytes(contents[source])
-            said = import_place(request)
+            report = import_place(request)
         except ValueError as error:
             raise ValueError(str(error).replace(f'{stage}/', '')) from None
         made = sorted(stage.iterdir())
@@ -83,7 +83,9 @@ def import_dropped(
                 with contextlib.suppress(OSError):
                     (folder / path.name).unlink(missing_ok=True)
             raise FileError(in_one_line(error)) from None
-    found = said[0].replace(f'{stage}/', '')
+    drawn = {str(out), report.content['drawn']}
+    told = [line for line in report.lines if line.partition(': ')[2] not in drawn]
+    found = '; '.join(told).replace(f'{stage}/', '')
     return folder / out.name, f'{found}; written to {folder / out.name}'
 
 
@@ -119,6 +121,11 @@ def _with_its_picture(source: Path, contents: Mapping[str, bytes]) -> bytes:
     if not isinstance(image, str) or not image:
         return data  # whoever reads it says what is wrong
     named = image.replace('\\', '/').rpartition('/')[2]
+    stem = Path(named).stem.casefold()
+    if not any(Path(name).stem.casefold() == stem for name in contents.keys() - {source.name}):
+        others = ', '.join(sorted(contents.keys() - {source.name}))
+        came = f' (not {others})' if others else ''
+        raise ValueError(f'{source.name} names {named}{came}: expected it with {source.name}')
     if named == image:
         return data
     return yaml.safe_dump({**values, 'image': named}, sort_keys=False).encode()

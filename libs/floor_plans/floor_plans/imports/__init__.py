@@ -6,6 +6,7 @@ patrolling_sim, of Nav2's route server and of Open-RMF, `place_import` does the 
 """
 
 from floor_plans.imports.graphs import SUFFIXES as SUFFIXES
+from floor_plans.imports.place_import import ImportReport as ImportReport
 from floor_plans.imports.place_import import ImportRequest as ImportRequest
 from floor_plans.imports.place_import import import_place as import_place
 from floor_plans.imports.place_import import is_levels as is_levels

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,6 +46,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help=f'radius of the robot, metres (default: {ROBOT_RADIUS:g})',
     )
     parser.add_argument(
+        '--with-outside',
+        action='store_true',
+        help='make a room of what is outside of the building, up to the edge of the map',
+    )
+    parser.add_argument(
+        '--json', action='store_true', help='print what was found for a program, as JSON'
+    )
+    parser.add_argument(
         '--force', action='store_true', help='write over a place that is there already'
     )
 
@@ -62,7 +71,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
     if not 0.01 <= options.robot_radius <= 5.0:
         parser.error(f'--robot-radius {options.robot_radius:g}: expected 0.01 to 5')
     try:
-        lines = import_place(
+        report = import_place(
             ImportRequest(
                 source=options.map,
                 out=options.out,
@@ -71,11 +80,12 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
                 level=options.level,
                 labels=options.labels,
                 force=options.force,
+                with_outside=options.with_outside,
                 command=f'{parser.prog} {options.map}',
             )
         )
     except ValueError as error:
         print(f'import: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT
-    print('\n'.join(lines))
+    print(json.dumps(report.content) if options.json else report)
     return 0

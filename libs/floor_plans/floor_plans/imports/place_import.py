@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from PIL import Image
 
 from floor_plans import ROBOT_RADIUS, read_place
@@ -19,7 +20,8 @@ from floor_plans.drawing import draw_place
 from floor_plans.facts import counted, facts
 from floor_plans.imports.graphs import SUFFIXES, read_graph
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
-from floor_plans.map_rooms import Proposal, propose
+from floor_plans.map_rooms import LeftOut, Proposal, propose
+from floor_plans.map_rooms.proposal import OUTSIDE
 from floor_plans.occupancy_grid import distance_to
 from floor_plans.occupancy_map import (
     OccupancyMap,
@@ -47,6 +49,7 @@ class ImportRequest:
         level: The level of a building that has several.
         labels: Where to write the rooms as a picture; None: nowhere.
         force: Whether to write over a place that is there already.
+        with_outside: What is outside of the building is a room, too.
         command: What a person typed, for the head of the place's file; empty: nothing.
         kept: Files that are not written over, whatever was asked for.
     """
@@ -58,6 +61,7 @@ class ImportRequest:
     level: str = ''
     labels: Path | None = None
     force: bool = False
+    with_outside: bool = False
     command: str = ''
     kept: tuple[Path, ...] = ()
 
@@ -72,7 +76,26 @@ class ImportRequest:
         return f'Written by: {self.command}' if self.command else f'Made of: {self.source}'
 
 
-def import_place(request: ImportRequest) -> list[str]:
+@dataclass(frozen=True)
+class ImportReport:
+    """What an import made, and what it believes.
+
+    Attributes:
+        found: What there is, in one line.
+        lines: What there is to say, for a person.
+        content: The same and more for a program, as plain values: rooms and doors with their
+            confidence, entrances, what is outside, what is left out and why.
+    """
+
+    found: str
+    lines: tuple[str, ...]
+    content: Mapping[str, Any]
+
+    def __str__(self) -> str:
+        return '\n'.join(self.lines)
+
+
+def import_place(request: ImportRequest) -> ImportReport:
     """Make the place, write and draw it; return what there is to say.
 
     Raises:
@@ -128,7 +151,7 @@ def _levels_in(path: Path) -> Any:
 
 def _proposed(request: ImportRequest, building: OccupancyMap, doors: Mapping[str, Any]) -> Proposal:
     try:
-        return propose(building, request.radius, doors)
+        return propose(building, request.radius, doors, with_outside=request.with_outside)
     except ValueError as error:
         raise ValueError(f'{request.source}: {error}') from None
 
@@ -138,14 +161,12 @@ def _written(
     proposal: Proposal,
     reference: Mapping[str, object],
     parameters: Mapping[str, Any],
-    more: list[str],
-) -> list[str]:
+    notes: list[str],
+) -> ImportReport:
     """Write the place's file and draw it; return what there is to say."""
     out, found = request.place, _found(proposal)
-    lines = []
     if request.labels is not None:
         write_labels(proposal, request.labels)
-        lines.append(f'rooms as a picture: {request.labels}')
     title = (
         f'{found}\n{request.origin}\n'
         'Metres and radians in the frame of the map. Rename rooms and doors as you like;\n'
@@ -156,11 +177,98 @@ def _written(
     if picture.resolve() in {each.resolve() for each in kept}:
         picture = out.with_name(out.stem + '_drawn.png')
     text = format_place({**reference, **parameters}, title)
-    return [f'{request.source}: {found}', *more, *lines, *_draw(request, text, picture)]
+    _draw(request, text, picture, proposal)
+    content = {
+        **_content(proposal, parameters),
+        'notes': notes,
+        'place': str(out),
+        'drawn': str(picture),
+    }
+    labels = [] if request.labels is None else [f'rooms as a picture: {request.labels}']
+    lines = [f'{request.source}: {found}', *notes, *_explained(proposal, content), *labels]
+    return ImportReport(found, (*lines, f'place: {out}', f'drawn: {picture}'), content)
 
 
-def _draw(request: ImportRequest, text: str, picture: Path) -> list[str]:
-    """Write a place's text, read it as a robot would, and draw what it means."""
+_MOST_POINTS = 6
+_DOUBTFUL = 0.75
+"""A room or a door with less confidence is named as doubtful."""
+
+
+def _explained(proposal: Proposal, content: Mapping[str, Any]) -> list[str]:
+    """Return the lines on what is doubtful, outside, or left out with its reason."""
+    lines = []
+    doubtful = [
+        f'{each["name"]} ({each["confidence"]:g})'
+        for each in (*content['rooms'], *content['doors'])
+        if each['confidence'] < _DOUBTFUL
+    ]
+    if doubtful:
+        lines.append(f'doubtful, look at these first: {", ".join(doubtful)}')
+    for wall, room in proposal.entrances.items():
+        lines.append(f'{wall}: a wall that closes the way out of {room}')
+    reasons: dict[str, list[LeftOut]] = {}
+    for each in proposal.left_out:
+        reasons.setdefault(each.reason, []).append(each)
+    for reason, parts in reasons.items():
+        points = ', '.join(
+            f'({x:.1f}, {y:.1f})' for x, y in (each.at for each in parts[:_MOST_POINTS])
+        )
+        more = f' and {len(parts) - _MOST_POINTS} more' if len(parts) > _MOST_POINTS else ''
+        area = sum(each.area for each in parts)
+        undo = '; --with-outside makes it a room' if reason == OUTSIDE else ''
+        lines.append(f'left out, {reason}: {area:.1f} m2 at {points}{more}{undo}')
+    return lines
+
+
+def _content(proposal: Proposal, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a proposal as plain values: metres, square metres, confidence from 0.5 to 1."""
+    areas, sure = proposal.areas(), proposal.confidence()
+    # A building's own names stand in the place's parameters, in the order of the proposal's.
+    renamed = dict(zip(proposal.parameters['map'], parameters['map'], strict=True))
+    joins: dict[str, list[str]] = {}
+    for room, doors in parameters['map'].items():
+        for door in doors:
+            joins.setdefault(door, []).append(room)
+    corridors = {proposal.names[n] for n in proposal.segmentation.corridors & proposal.names.keys()}
+    return {
+        'rooms': [
+            {
+                'name': renamed[name],
+                'kind': 'corridor' if name in corridors else 'room',
+                'area': round(areas[name], 2),
+                'at': list(parameters['room_positions'][renamed[name]][:2]),
+                'doors': list(parameters['map'][renamed[name]]),
+                'confidence': sure[name],
+            }
+            for name in proposal.parameters['map']
+        ],
+        'doors': [
+            {
+                'name': name,
+                'joins': joins[name],
+                'at': list(row[:2]),
+                'width': row[3],
+                'confidence': sure[name],
+            }
+            for name, row in parameters.get('doors', {}).items()
+        ],
+        'entrances': [
+            {'wall': wall, 'room': renamed[room], 'line': parameters['walls'][wall]}
+            for wall, room in proposal.entrances.items()
+        ],
+        'outside': [_part(each) for each in proposal.left_out if each.reason == OUTSIDE],
+        'left_out': [_part(each) for each in proposal.left_out if each.reason != OUTSIDE],
+    }
+
+
+def _part(part: LeftOut) -> dict[str, Any]:
+    return {'reason': part.reason, 'area': part.area, 'at': list(part.at)}
+
+
+def _draw(
+    request: ImportRequest, text: str, picture: Path, proposal: Proposal | None = None
+) -> None:
+    """Write a place's text, read it as a robot would, and draw what it means and leaves out."""
     out = request.place
     try:
         replace_text(out, text)
@@ -168,15 +276,32 @@ def _draw(request: ImportRequest, text: str, picture: Path) -> list[str]:
         raise FileError(in_one_line(error)) from None
     plan = read_place(out, radius=request.radius).plan
     title = out.stem.replace('_', ' ')
-    image = draw_place(plan, title[:1].upper() + title[1:], facts(plan))
+    aside = {} if proposal is None or plan.map is None else _aside(proposal, plan.map)
+    image = draw_place(plan, title[:1].upper() + title[1:], facts(plan), aside=aside)
     try:
         image.save(picture)
     except OSError as error:
         raise FileError(f'{picture}: cannot be written: {error.strerror or error}') from None
-    return [f'place: {out}', f'drawn: {picture}']
 
 
-def _import_graph(request: ImportRequest, document: Any) -> list[str]:
+def _aside(proposal: Proposal, building: OccupancyMap) -> dict[str, NDArray[np.bool_]]:
+    """Return the cells of the place's map that are outside, and those that are left out."""
+    own, grid = building.own_grid, building.grid
+    labels = proposal.segmentation.labels
+    if grid.cells.shape != own.cells.shape or building.origin[2]:
+        cells = np.argwhere(np.ones_like(grid.cells, np.bool_))
+        where = own.cells_of(building.to_own(grid.centres_of(cells)))
+        inside = own.contains(where)
+        turned = np.zeros(grid.cells.size, labels.dtype)
+        turned[inside] = labels[where[inside, 0], where[inside, 1]]
+        labels = turned.reshape(grid.cells.shape)
+    outside = np.isin(labels, proposal.outside) & grid.free
+    left = {each.number for each in proposal.left_out} - {0, *proposal.outside}
+    masks = {'outside': outside, 'left out': np.isin(labels, list(left)) & grid.free}
+    return {word: mask for word, mask in masks.items() if mask.any()}
+
+
+def _import_graph(request: ImportRequest, document: Any) -> ImportReport:
     source = request.source
     if request.labels is not None or request.resolution is not None:
         raise ValueError(
@@ -185,11 +310,21 @@ def _import_graph(request: ImportRequest, document: Any) -> list[str]:
     parameters = read_graph(source, document, request.level)
     said = f'{counted(len(parameters["map"]), "room")} of a graph'
     title = f'{said}\n{request.origin}'
-    text = format_place(parameters, title)
-    return [f'{source}: {said}', *_draw(request, text, request.place.with_suffix('.png'))]
+    picture = request.place.with_suffix('.png')
+    _draw(request, format_place(parameters, title), picture)
+    lines = (f'{source}: {said}', f'place: {request.place}', f'drawn: {picture}')
+    content = {
+        'rooms': [
+            {'name': room, 'at': list(parameters['room_positions'][room]), 'doors': list(doors)}
+            for room, doors in parameters['map'].items()
+        ],
+        'place': str(request.place),
+        'drawn': str(picture),
+    }
+    return ImportReport(said, lines, content)
 
 
-def _import_building(request: ImportRequest, level: RmfLevel) -> list[str]:
+def _import_building(request: ImportRequest, level: RmfLevel) -> ImportReport:
     if request.resolution is not None:
         raise ValueError(f'{request.source}: measures its pixels itself: expected no --resolution')
     drawn = request.place.with_name(f'{request.place.stem}_map.yaml')
@@ -286,7 +421,12 @@ def _found(proposal: Proposal) -> str:
     said = [counted(rooms, 'room')]
     if corridors:
         said.append(counted(corridors, 'corridor'))
-    said.append(counted(len(proposal.parameters.get('doors', {})), 'door'))
-    if proposal.left_out:
-        said.append(f'{len(proposal.left_out)} left out that the robot cannot reach')
+    exits = len(proposal.entrances)
+    said.append(counted(len(proposal.parameters.get('doors', {})) + exits, 'door'))
+    if exits:
+        one = 'one of them leads' if exits == 1 else f'{exits} of them lead'
+        said.append(f'{one} outside and {"is" if exits == 1 else "are"} closed')
+    left = len(proposal.left_out) - len(proposal.outside)
+    if left:
+        said.append(f'{counted(left, "part")} of the floor left out')
     return ', '.join(said)

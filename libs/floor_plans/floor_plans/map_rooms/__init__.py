@@ -6,6 +6,7 @@ cuts that part no two rooms, `segmentation` does all of it for a map, `proposal`
 the result: rooms and doors with names, a point in each room that the robot can reach.
 """
 
+from floor_plans.map_rooms.proposal import LeftOut as LeftOut
 from floor_plans.map_rooms.proposal import Proposal as Proposal
 from floor_plans.map_rooms.proposal import propose as propose
 from floor_plans.map_rooms.segmentation import Segmentation as Segmentation

@@ -2,13 +2,14 @@
 
 Where two rooms meet there is a border of free cells. Its pieces that the robot fits through are
 doors, as wide as they are from jamb to jamb; the others are walls that the map does not show, as a
-gap that a scan left. Rooms that the robot cannot reach are left out and counted.
+gap that a scan left. What reaches to the edge of the map all around, as the paper of a floor plan
+does, is outside: the ways out are closed. Whatever else is no room is left out with its reason.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -18,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.floor_plan import Door, FloorPlan
+from floor_plans.map_rooms.joining import SEPARATE
 from floor_plans.map_rooms.segmentation import (
+    SMALLEST_ROOM,
     Line,
     Segmentation,
     segment,
@@ -41,8 +44,34 @@ _SPARE = 0.1
 _SHORTEST_WALL = 0.12
 _LINE_CELLS = 5
 """A room's point keeps this far from the lines of doors: their thickness, working cells."""
+OUTSIDE = 'outside of the building: it reaches to the edge of the map all around'
 _BESIDE_DOOR = 0.3
 """An opening is a known door if their middles are at most so far apart, metres."""
+
+
+_PAPER = 0.6
+"""Share of the map's edge from which on free floor there is outside, as that of a scanned plan."""
+_AT_EDGE = 0.02
+"""A part with less of the edge is a room that the map cuts off."""
+_DUST = 0.5
+"""A part of the floor with less area is not worth a word, m^2."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A part of the floor that is no room of the place.
+
+    Attributes:
+        number: Of it among the rooms that were found; 0: it is too small to be one.
+        reason: Why, in words.
+        area: Square metres.
+        at: A point in it, x and y in metres.
+    """
+
+    number: int
+    reason: str
+    area: float
+    at: Point
 
 
 @dataclass(frozen=True)
@@ -53,13 +82,44 @@ class Proposal:
         parameters: All of the place's file below `ros__parameters`, but for the map's file.
         segmentation: The rooms as they were found.
         names: Name of each room by its number.
-        left_out: Numbers of the rooms that the robot cannot reach.
+        left_out: The parts of the floor that are no rooms of the place, outside first.
+        entrances: Names of the walls that close a way out, and the room that it leads out of.
     """
 
     parameters: Mapping[str, Any]
     segmentation: Segmentation
     names: Mapping[int, str]
-    left_out: tuple[int, ...]
+    left_out: tuple[LeftOut, ...]
+    entrances: Mapping[str, str]
+
+    def areas(self) -> dict[str, float]:
+        """Return the area of each room, square metres."""
+        grid = self.segmentation.working
+        counts = np.bincount(self.segmentation.working_labels.ravel(), minlength=1)
+        return {name: float(counts[n]) * grid.resolution**2 for n, name in self.names.items()}
+
+    def confidence(self) -> dict[str, float]:
+        """Return how sure each room and door is, from 0.5 to 1.
+
+        A door is sure if it is narrow for the smaller room behind it, as rooms are told apart
+        (`joining`); a room is as sure as the least sure of its doors for which it is the smaller.
+        """
+        areas, found = self.areas(), dict.fromkeys(self.names.values(), 1.0)
+        sides: dict[str, list[str]] = {}
+        for room, doors in self.parameters['map'].items():
+            for door in doors:
+                sides.setdefault(door, []).append(room)
+        for door, (*_, width) in self.parameters.get('doors', {}).items():
+            smaller = min(sides[door], key=areas.__getitem__)
+            separation = max(areas[smaller] / width**2, SEPARATE)
+            found[door] = round(1.0 - 0.5 * SEPARATE / separation, 2)
+            found[smaller] = min(found[smaller], found[door])
+        return found
+
+    @property
+    def outside(self) -> tuple[int, ...]:
+        """Numbers of the parts that are outside of the building."""
+        return tuple(each.number for each in self.left_out if each.reason == OUTSIDE)
 
 
 @dataclass(frozen=True)
@@ -74,7 +134,11 @@ class _Opening:
 
 
 def propose(
-    building: OccupancyMap, radius: float, doors: Mapping[str, Line] | None = None
+    building: OccupancyMap,
+    radius: float,
+    doors: Mapping[str, Line] | None = None,
+    *,
+    with_outside: bool = False,
 ) -> Proposal:
     """Return a place with the rooms and doors of a map.
 
@@ -82,6 +146,7 @@ def propose(
         building: The map.
         radius: Of the robot, metres.
         doors: Doors that are known, by name: each parts two rooms. World frame, metres.
+        with_outside: What is outside of the building is a room, too.
 
     Raises:
         ValueError: The robot fits nowhere.
@@ -92,7 +157,8 @@ def propose(
     # A working cell is not exactly 0.05 m where the map's are of another size.
     scale = building.cells.shape[1] * building.resolution / grid.cells.shape[1]
     free = grid.free
-    floor = _Floor(building, radius, known, scale, free, distance_to(~free, grid.resolution))
+    clearance = distance_to(~free, grid.resolution)
+    floor = _Floor(building, radius, known, scale, free, clearance, with_outside)
     for _ in range(found.rooms):
         layout = _laid_out(floor, found)
         pair = layout.one_room or _not_parted(floor, layout)
@@ -113,6 +179,7 @@ class _Floor:
         scale: Side of a working cell, metres.
         free: The working cells that are free.
         clearance: How far each is from what is not, metres.
+        with_outside: What is outside of the building is a room, too.
     """
 
     building: OccupancyMap
@@ -121,6 +188,7 @@ class _Floor:
     scale: float
     free: Mask
     clearance: NDArray[np.float32]
+    with_outside: bool
 
     def world(self, points: list[tuple[float, float]]) -> NDArray[np.float64]:
         """Return working cells (column, row) in the world, metres."""
@@ -152,10 +220,16 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
         *(found.working_labels, floor.clearance),
         *(floor.radius, floor.scale),
     )
-    reach = _reachable(labels, clearance, radius)
+    outside = frozenset[int]() if floor.with_outside else outside_of(found)
+    inner = np.where(np.isin(labels, list(outside)), 0, labels) if outside else labels
+    reach = _reachable(inner, clearance, radius)
     needed = radius + 1.5 * found.working.resolution
     openings = _openings(labels, floor.free, clearance, needed + _SPARE)
-    ways = [each for each in openings if each.clearance > needed and _fits(reach, each)]
+    ways = [
+        each
+        for each in openings
+        if each.clearance > needed and _fits(reach, each) and outside.isdisjoint(each.rooms)
+    ]
     rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, ways)
     if not rooms:
         raise ValueError(f'a robot with a radius of {radius:g} m fits nowhere: expected free floor')
@@ -182,6 +256,9 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
         for each in openings
         if id(each) not in listed and set(each.rooms) <= rooms
     ]
+    exits = [each for each in openings if outside & set(each.rooms) and rooms & set(each.rooms)]
+    closed = [_as_line(_longer(floor.world([each.start, each.end]), scale)) for each in exits]
+    walls += closed
     lines = [Door(name, *row).ends for name, row in placed.items()]
     near = _beside(floor, [*lines, *walls])
     positions: dict[str, list[float]] = {}
@@ -196,7 +273,9 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
             inside = mask
         cell = point_in(inside, reach, clearance, radius)
         positions[names[number]] = _rounded(floor.world([cell])[0])
-    walls += _gaps(floor, found, [*lines, *walls], list(positions.values()))
+    points = list(positions.values())
+    points += [floor.world([_widest(labels == number, clearance)])[0] for number in outside]
+    walls += _gaps(floor, found, [*lines, *walls], points)
     station, home = _station(floor.building, labels, reach & ~near, rooms, names, positions, scale)
     parameters: dict[str, Any] = {
         'map': table,
@@ -207,14 +286,102 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     }
     if placed:
         parameters['doors'] = placed
+    wide = [line for each, line in zip(exits, closed, strict=True) if each.clearance > needed]
+    walled = {line: f'entrance{index}' for index, line in enumerate(wide, start=1)}
+    for line in walls:
+        walled.setdefault(line, f'W{len(walled) - len(wide) + 1}')
     if walls:
         parameters['walls'] = {
-            f'W{index}': [*_rounded(np.array(start)), *_rounded(np.array(end))]
-            for index, (start, end) in enumerate(walls, start=1)
+            walled[line]: [*_rounded(np.array(line[0])), *_rounded(np.array(line[1]))]
+            for line in walls
         }
-    everything = set(range(1, found.rooms + 1))
-    proposal = Proposal(parameters, found, names, tuple(sorted(everything - rooms)))
+    entrances = {
+        walled[line]: names[next(number for number in each.rooms if number in rooms)]
+        for each, line in zip(exits, closed, strict=True)
+        if each.clearance > needed
+    }
+    left_out = _left_out(floor, found, rooms, outside, openings)
+    proposal = Proposal(parameters, found, names, left_out, entrances)
     return _Layout(proposal, joins, one_room)
+
+
+def outside_of(found: Segmentation) -> frozenset[int]:
+    """Return the numbers of the parts that are outside of the building; none: it has no outside.
+
+    A robot's map ends at what nobody has seen. Where it ends at free floor all around, somebody has
+    drawn it on white paper, or has marked as free what is not known.
+    """
+    labels = found.working_labels
+    edge = np.concatenate([labels[0], labels[-1], labels[1:-1, 0], labels[1:-1, -1]])
+    counts = np.bincount(edge, minlength=found.rooms + 1)
+    counts[0] = 0
+    if counts.sum() < _PAPER * len(edge):
+        return frozenset()
+    outer = frozenset(np.flatnonzero(counts >= _AT_EDGE * len(edge)).tolist())
+    # A field or a yard without a building is the place itself.
+    return outer if set(range(1, found.rooms + 1)) - outer else frozenset()
+
+
+def _widest(mask: Mask, clearance: NDArray[np.float32]) -> Point:
+    """Return the cell of a part that is farthest from what stands there, column and row."""
+    cells = np.argwhere(mask)
+    row, column = cells[np.argmax(clearance[cells[:, 0], cells[:, 1]])]
+    return float(column), float(row)
+
+
+def _left_out(
+    floor: _Floor,
+    found: Segmentation,
+    rooms: set[int],
+    outside: frozenset[int],
+    openings: Sequence[_Opening],
+) -> tuple[LeftOut, ...]:
+    """Return what of the floor is no room, with the reason: outside, then rooms, then small parts.
+
+    The widths are those of openings: a robot of a radius needs twice that and some centimetres.
+    """
+    labels, clearance, cell = found.working_labels, floor.clearance, floor.scale**2
+    areas = np.bincount(labels.ravel(), minlength=found.rooms + 1) * cell
+    needed = floor.radius + 1.5 * found.working.resolution
+
+    def part(number: int, mask: Mask, reason: str, area: float) -> LeftOut:
+        x, y = _rounded(floor.world([_widest(mask, clearance)])[0])
+        return LeftOut(number, reason, round(float(area), 2), (x, y))
+
+    others = sorted(set(range(1, found.rooms + 1)) - rooms - outside)
+
+    def why(number: int) -> str:
+        if float(clearance[labels == number].max()) <= floor.radius:
+            return f'too narrow for a robot {2 * floor.radius:g} m wide'
+        # Rooms that lead into each other have their way in together.
+        mine = {number}
+        while (
+            more := {
+                each
+                for opening in openings
+                if opening.clearance > needed and mine & set(opening.rooms)
+                for each in opening.rooms
+                if each in others
+            }
+            - mine
+        ):
+            mine |= more
+        ways = [each for each in openings if len(mine & set(each.rooms)) == 1]
+        widest = max((each.clearance for each in ways if rooms & set(each.rooms)), default=0.0)
+        if widest:
+            return f'no way in that is wide enough: {2 * widest:.2f} m, not {2 * needed:.2f} m'
+        from_outside = any(outside & set(each.rooms) for each in ways)
+        return 'reached from outside alone' if from_outside else 'no door: walls all around'
+
+    left = [part(each, labels == each, OUTSIDE, areas[each]) for each in sorted(outside)]
+    left += [part(each, labels == each, why(each), areas[each]) for each in others]
+    pieces, stats = cv2.connectedComponentsWithStats(
+        (floor.free & (labels == 0)).astype(np.uint8), connectivity=4
+    )[1:3]
+    for piece in range(1, len(stats)):
+        if (area := float(stats[piece, cv2.CC_STAT_AREA]) * cell) >= _DUST:
+            left.append(part(0, pieces == piece, f'smaller than {SMALLEST_ROOM:g} m2', area))
+    return tuple(left)
 
 
 def _not_parted(floor: _Floor, layout: _Layout) -> tuple[int, int] | None:
@@ -255,7 +422,7 @@ def _beside(floor: _Floor, lines: list[Line]) -> Mask:
 
 
 def _gaps(
-    floor: _Floor, found: Segmentation, lines: list[Line], points: list[list[float]]
+    floor: _Floor, found: Segmentation, lines: list[Line], points: Sequence[Sequence[float]]
 ) -> list[Line]:
     """Return walls where two rooms are one beside their door, through cells that are too narrow.
 
