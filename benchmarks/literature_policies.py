@@ -21,17 +21,17 @@ from numpy.typing import NDArray
 from patrol_policy.battery import Energy
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.policies import Policy, Scores, by_chance, oldest
-from patrol_policy.world import PolicyMemory, Score, World
+from patrol_policy.situation import PolicyMemory, Score, Situation
 
 PASSES: WeakKeyDictionary[PolicyMemory, int] = WeakKeyDictionary()
 """Where on the tour each robot is."""
 
 
 def heuristic_reactive(
-    world: World, allowed: Sequence[str], energy: Energy | None = None
+    world: Situation, allowed: Sequence[str], energy: Energy | None = None
 ) -> Scores:
     """Half the idleness, half the nearness of each candidate, each over the greatest of them."""
-    idle = np.array([world.unvisited(place) for place in allowed])
+    idle = np.array([world.idleness_of(place) for place in allowed])
     far = np.array([world.graph.seconds(world.place, place) for place in allowed])
     return {
         place: Score(float(value), place, f'{place} is {away:.1f} s away')
@@ -40,7 +40,7 @@ def heuristic_reactive(
 
 
 def heuristic_cognitive(
-    world: World, allowed: Sequence[str], energy: Energy | None = None
+    world: Situation, allowed: Sequence[str], energy: Energy | None = None
 ) -> Scores:
     """Towards the goal with the best mix of idleness and nearness, over places that are idle."""
     graph = world.graph
@@ -86,7 +86,7 @@ def _idle_ways(
     return first, dijkstra(backwards, indices=goal)  # type: ignore[call-overload]
 
 
-def cycle(world: World, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
+def cycle(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
     """Return how soon each candidate comes on the closed tour, from where the robot is on it.
 
     The tour may pass a place several times: the pass that the robot is on is remembered. A robot
@@ -96,7 +96,7 @@ def cycle(world: World, allowed: Sequence[str], energy: Energy | None = None) ->
     here = (PASSES.get(world.memory, -1) + 1) % len(walk)
     if walk[here] != world.place:
         at = [number for number, place in enumerate(walk) if place == world.place]
-        here = max(at, key=lambda number: world.unvisited(walk[(number + 1) % len(walk)]))
+        here = max(at, key=lambda number: world.idleness_of(walk[(number + 1) % len(walk)]))
     PASSES[world.memory] = here
     ahead = walk[here + 1 :] + walk[: here + 1]
     return {

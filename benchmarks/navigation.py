@@ -50,7 +50,7 @@ from launcher.run_processes import command, node_environ
 from lidar_navigation import Drive, DriveState, GridPlanner, Navigator, PlanningParameters, geometry
 from lidar_navigation.geometry import Scan
 from patrol_policy.battery import PERCENTILE_99
-from surveillance_behaviour.experience import LegTimes
+from surveillance_behaviour.learned_times import LegTimes
 from surveillance_runtime import node_table
 from surveillance_simulation.robot.robot import Robot
 from surveillance_simulation.world.people import People, PeopleModel

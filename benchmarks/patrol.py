@@ -41,7 +41,6 @@ from benchmarks.literature_policies import LITERATURE
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from floor_plans import read_place
-from patrol_policy.bounds import charge_bound, default_table, rule_bound
 from patrol_policy.decision import QUIET, RECHARGE
 from patrol_policy.graph import (
     GraphError,
@@ -49,6 +48,7 @@ from patrol_policy.graph import (
     graph_of_places,
 )
 from patrol_policy.hours import Calendar, WeeklyHours
+from patrol_policy.lower_bounds import charge_bound, default_table, rule_bound
 from patrol_policy.patrolling_sim import read_patrolling_sim
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES
 from patrol_policy.promises import LATER, NEVER, WITHIN, promises
@@ -392,7 +392,7 @@ def with_battery(count: int, states: int) -> None:
         if any(each.verdict == NEVER for each in told.values()):
             print(f'{place.name:22} {reach:5.1f} {stop:5.0f} {charge:6.2f}  not all in range')
             continue
-        bound = charge_bound(run.plan.rules, states=states)
+        bound = charge_bound(run.planner.rule_graph, states=states)
         proven += bound.within(0.02)
         ratios.append(wait / bound.low)
         sign = '*' if bound.within(0.02) else ' '

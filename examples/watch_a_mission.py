@@ -13,7 +13,7 @@ import numpy as np
 from rich.console import Console
 
 from floor_plans import Grid
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_state import MissionState, Status
 from surveillance_operator.page_state import PatchMaker

@@ -8,7 +8,7 @@ from patrol_policy.battery import Battery
 from patrol_policy.decision import DecisionSettings, tour_warning
 from patrol_policy.plan import LEG_CHANGE
 from patrol_policy.promises import Promise, promises, summary, verdicts
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 from state_machines import Interrupt
 from strict_files.suggestions import nearest
 
@@ -28,7 +28,7 @@ class SettingsCheck:
         self._seconds = 0.0
         self._classes: tuple[str, ...] = ()
 
-    def threshold(self, world: World) -> None:
+    def threshold(self, world: Situation) -> None:
         """Warn of a threshold that no robot can keep to.
 
         The shortest tour takes long on a large map. It is looked for anew only when places or
@@ -91,7 +91,9 @@ class PromiseTeller:
         self._verdicts: dict[str, str] = {}
         self._rested_on: object = None
 
-    def tell(self, world: World, battery: Battery, places: Collection[str], rules: object) -> None:
+    def tell(
+        self, world: Situation, battery: Battery, places: Collection[str], rules: object
+    ) -> None:
         """Say it if it has changed.
 
         Args:
@@ -100,7 +102,7 @@ class PromiseTeller:
             places: All places of the map.
             rules: What holds for single places.
         """
-        settings, plan = self._settings, world.memory.plan
+        settings, plan = self._settings, world.memory.planner
         rests_on = (
             world.graph.places,
             world.threshold,
@@ -116,7 +118,7 @@ class PromiseTeller:
             return
         found = self.promised = promises(world, battery, settings, sorted(places))
         # The first time there was no plan yet.
-        self._rested_on = (world.memory.plan, rests_on)
+        self._rested_on = (world.memory.planner, rests_on)
         self.publish(found)
         now = verdicts(found)
         if any(self._verdicts.get(place, '') != verdict for place, verdict in now.items()):
@@ -124,7 +126,7 @@ class PromiseTeller:
             self._say(summary(found))
 
 
-def _fleet_waits(world: World) -> tuple[str, ...]:
+def _fleet_waits(world: Situation) -> tuple[str, ...]:
     """Return what the fleet keeps, so roughly that only a changed plan changes it."""
     if world.fleet is None:
         return ()

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point as PointMessage
 
 from patrol_policy.promises import CLOSED, LATER, NEVER, UNKNOWN, WITHIN, Promise
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
 from surveillance_behaviour.ports import Check, Doubt, Point
 from surveillance_interfaces.msg import Decision as DecisionMessage

@@ -2,7 +2,7 @@
 
 The ontology says where the robot is, what it can reach, which classes each place has and when it
 was visited: one snapshot for each choice (`ontology_view`). The robot itself knows better where the
-places are and how long each leg takes (`patrol_map`), when it was where (`experience`), and who is
+places are and how long each leg takes (`patrol_map`), when it was where (`learned`), and who is
 on its way, too (`traffic`). `announcements` says beside the decisions what cannot work or be kept.
 
 One process of a robot decides: `robot_behavior` in the behaviour `surveillance`, `reasoner` in
@@ -31,11 +31,11 @@ from patrol_policy.decision import (
 )
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.promises import Promise
-from patrol_policy.world import Decision, PolicyMemory, World
+from patrol_policy.situation import Decision, PolicyMemory, Situation
 from state_machines import Interrupt
 from surveillance_behaviour.announcements import PromiseTeller, SettingsCheck
 from surveillance_behaviour.charging import BatteryMonitor
-from surveillance_behaviour.experience import Experience, LegTimer
+from surveillance_behaviour.learned_times import LearnedTimes, LegTimer
 from surveillance_behaviour.ontology_view import OntologyView
 from surveillance_behaviour.patrol_map import PatrolMap
 from surveillance_behaviour.ports import Ontology, Places
@@ -53,7 +53,7 @@ class DecisionMaker:
         ontology: The ontology.
         places: Where the places are.
         battery: The battery.
-        experience: What the robot has learned; default: nothing yet.
+        learned: What the robot has learned; default: nothing yet.
         generator: Chance, for the policies that need it.
         warn: Told once when no robot can keep to the threshold on this map, and when the rules
             name a class that the ontology does not have.
@@ -69,7 +69,7 @@ class DecisionMaker:
 
     Attributes:
         settings: Those.
-        experience: That.
+        learned: That.
         traffic: That.
         place: Where the robot is, as far as was heard.
         promises: What can be kept of each place.
@@ -83,7 +83,7 @@ class DecisionMaker:
         ontology: Ontology,
         places: Places,
         battery: BatteryMonitor,
-        experience: Experience | None = None,
+        learned: LearnedTimes | None = None,
         generator: random.Random | None = None,
         warn: Callable[[str], None] = lambda sentence: None,
         announce: Callable[[Decision], None] = lambda decision: None,
@@ -95,13 +95,13 @@ class DecisionMaker:
         promise: Callable[[tuple[Promise, ...]], None] = lambda found: None,
     ) -> None:
         self.settings = settings
-        self.experience = experience or Experience()
-        self.experience.elapsed = elapsed
+        self.learned = learned or LearnedTimes()
+        self.learned.elapsed = elapsed
         self.traffic = traffic or Traffic()
         self.place = ''
-        self.world: World | None = None
+        self.world: Situation | None = None
         self._view = OntologyView(ontology, settings, self.traffic.others_visits, warn, tell)
-        self._map = PatrolMap(places, settings, self.experience.leg_times)
+        self._map = PatrolMap(places, settings, self.learned.leg_times)
         self._check = SettingsCheck(settings, warn)
         self.promises = PromiseTeller(settings, tell, promise)
         self._leg = LegTimer(elapsed)
@@ -152,18 +152,18 @@ class DecisionMaker:
 
     def battery(self) -> Battery:
         """Return what a decision knows of the battery now."""
-        monitor, experience = self._battery, self.experience
+        monitor, learned = self._battery, self.learned
         told = {p: ChargeCurve.even(s.rate / 60.0) for p, s in self.stations.items() if s.rate}
         battery = Battery(
             monitor.level,
             monitor.low,
-            experience.draw.draw,
-            experience.sent_to_charge,
-            {**told, **experience.charge.curves()},
+            learned.draw.draw,
+            learned.sent_to_charge,
+            {**told, **learned.charge.curves()},
             self._map.approaches(self.stations),
         )
         if battery.sent_to_charge and battery.charged_enough(self.settings.battery):
-            experience.sent_to_charge = ''
+            learned.sent_to_charge = ''
             return replace(battery, sent_to_charge='')
         return battery
 
@@ -177,18 +177,18 @@ class DecisionMaker:
         def learn() -> None:
             if (level := self._battery.level) is None:
                 return
-            self.experience.draw.observe(now(), level)
+            self.learned.draw.observe(now(), level)
             if self.place in self.settings.recharge_rooms:
-                self.experience.charge.observe(self.place, now(), level)
+                self.learned.charge.observe(self.place, now(), level)
             if (world := self.world) is not None:
-                latest = max(self.experience.now or world.now, world.now)
+                latest = max(self.learned.now or world.now, world.now)
                 self.traffic.tell_charge(world, self.battery(), latest)
 
         self._battery.watch(learn)
 
     def look(
         self, now: float, interrupt: Interrupt, avoided: frozenset[str] = frozenset()
-    ) -> World:
+    ) -> Situation:
         """Return what is known now: one snapshot of the ontology, and the map brought up to date.
 
         Args:
@@ -205,17 +205,17 @@ class DecisionMaker:
         self._check.classes(self._view.place_classes, interrupt)
         return world
 
-    def _known(self, now: float, interrupt: Interrupt, avoided: frozenset[str]) -> World:
-        experience, rules = self.experience, self._rules
-        jump = experience.tell_time(now)
+    def _known(self, now: float, interrupt: Interrupt, avoided: frozenset[str]) -> Situation:
+        learned, rules = self.learned, self._rules
+        jump = learned.tell_time(now)
         self._since = now if self._since is None else min(self._since + jump, now)
-        found, said = self._view.look(now, self.place, rules, experience.visits, interrupt)
+        found, said = self._view.look(now, self.place, rules, learned.visited_at, interrupt)
         graph = self._map.update(found, rules.exploration, interrupt)
         self.place = found.place
         others = self.traffic.others_visits() if self.traffic.others_visits else {}
         # The ontology counts whole seconds; another robot's visit may be later.
-        sources = (found.visited_at, experience.visits, others)
-        return World(
+        sources = (found.visited_at, learned.visited_at, others)
+        return Situation(
             place=found.place,
             now=now,
             reachable=tuple(place for place in found.reachable if place in graph.index),
@@ -227,7 +227,7 @@ class DecisionMaker:
                 if place in found.visited_at or place in others
             },
             graph=graph,
-            time_spread=experience.leg_times.spread,
+            time_spread=learned.leg_times.spread,
             since=self._since,
             threshold=self.settings.urgency_threshold,
             own_thresholds={**rules.thresholds, **found.thresholds},
@@ -235,7 +235,7 @@ class DecisionMaker:
             target=self._target,
             avoided=avoided,
             priorities=self.settings.priorities,
-            requested=experience.requested,
+            requested=learned.requested,
             contradiction=found.contradiction,
             memory=self._memory,
             fleet=self.traffic.outlook(self._map.with_straight_times, now),
@@ -273,9 +273,9 @@ class DecisionMaker:
             CallError: The ontology cannot be asked.
             NowhereToGoError: Nothing can be reached.
         """
-        experience = self.experience
-        if experience.requested in avoided:
-            experience.requested = ''  # It was tried.
+        learned = self.learned
+        if learned.requested in avoided:
+            learned.requested = ''  # It was tried.
         # Where the robot was heard of last it is now. That visit is told with the snapshot's own
         # time, so that the ontology, too, knows until when the robot was there.
         if here := self._view.heard_place(self.place, interrupt):
@@ -283,27 +283,27 @@ class DecisionMaker:
         world = self.look(now, interrupt, avoided)
         # Else it is in no place, as where a drive ended early: the ontology has the last one.
         self.saw(world.place, now, came=None if here else self._view.came)
-        if to_charge and not experience.sent_to_charge:
+        if to_charge and not learned.sent_to_charge:
             why = why_charge(world, self.battery(), self.settings)
             self.send_to_charge(why or 'charging was begun')
         battery = self.battery()
         decision = self._decided(world, battery)
         # Of the same plan: nothing is planned for it.
         self.promises.tell(world, self.battery(), self.places, self._rules)
-        why, is_new = '', decision.rule == RECHARGE and not experience.sent_to_charge
+        why, is_new = '', decision.rule == RECHARGE and not learned.sent_to_charge
         if is_new:
             why = why_charge(world, battery, self.settings)
             approach = battery.approaches.get(decision.place, 0.0)
             self.traffic.begin_charge(decision, why, approach)
         decision = self.traffic.enter(
-            decision, world, self.battery(), experience.visits.copy(), interrupt
+            decision, world, self.battery(), learned.visited_at.copy(), interrupt
         )
         self._target = decision.target
         # A charge that was planned is a charge: it goes on until it is enough; one in passing until
         # its time is over, which the others are told.
         goes_on = not why and battery.charged_enough(self.settings.battery)
         if is_new and decision.rule == RECHARGE and not goes_on:
-            experience.sent_to_charge = why or decision.reason.partition(';')[0]
+            learned.sent_to_charge = why or decision.reason.partition(';')[0]
         if world.contradiction:
             decision = replace(decision, reason=f'{decision.reason}; {world.contradiction}')
         self._leg.begin(decision)
@@ -311,13 +311,13 @@ class DecisionMaker:
         self._announce(decision)
         return decision
 
-    def _decided(self, world: World, battery: Battery) -> Decision:
+    def _decided(self, world: Situation, battery: Battery) -> Decision:
         try:
             return decide(world, battery, self.settings)
         except RequestError as error:
             # What a person asked for in vain is no failure of the patrol.
-            if self.experience.requested == world.requested:
-                self.experience.requested = ''
+            if self.learned.requested == world.requested:
+                self.learned.requested = ''
             self._warn(f'{error}: continuing without it')
             return decide(replace(world, requested=''), battery, self.settings)
 
@@ -342,7 +342,7 @@ class DecisionMaker:
         check_place(place, world)
         if place == self.place and not self._leg.is_running:
             return f'the robot is in {place} already'
-        self.experience.requested = place
+        self.learned.requested = place
         self._save()
         return f'the robot goes to {place} when it has ended what it is at'
 
@@ -390,12 +390,12 @@ class DecisionMaker:
             came: When it came there, where it has left since; None: it is there now.
         """
         self.place = place
-        self.experience.saw(place, now, came=came)
+        self.learned.saw(place, now, came=came)
         if came is None and place == self._target:
             self._target = None
-        if came is None and place == self.experience.requested:
-            self.experience.requested = ''
-        self.traffic.saw(place, now, self.experience.visits.copy())
+        if came is None and place == self.learned.requested:
+            self.learned.requested = ''
+        self.traffic.saw(place, now, self.learned.visited_at.copy())
 
     def arrived(self, place: str, now: float, metres: float | None = None) -> None:
         """Note that the robot has come to ``place``, over a path of so many metres.
@@ -405,7 +405,7 @@ class DecisionMaker:
         leg = self._leg.end(place, now)
         if leg is not None and place in self.graph.leg_seconds.get(leg.start, ()):
             straight = self._map.metres(leg.start, place)
-            self.experience.leg_times.observe(leg.start, place, leg.seconds, straight, metres)
+            self.learned.leg_times.observe(leg.start, place, leg.seconds, straight, metres)
         self.saw(place, now)
         self.traffic.stands(self.place)
 
@@ -417,13 +417,13 @@ class DecisionMaker:
     def send_to_charge(self, why: str) -> None:
         """Have the robot charge before anything else."""
         self.traffic.begin_whole_charge()
-        self.experience.sent_to_charge = why
+        self.learned.sent_to_charge = why
 
     def charged(self) -> None:
         """Note that the robot has been charged."""
-        self.experience.sent_to_charge = ''
+        self.learned.sent_to_charge = ''
         self._leg.forget()
-        self.traffic.charged(self.experience.now or (self.world.now if self.world else 0.0))
+        self.traffic.charged(self.learned.now or (self.world.now if self.world else 0.0))
 
     def charge_is_over(self, now: float) -> bool:
         """Return whether a charge in passing has had its time, and the battery asks for none."""
@@ -441,4 +441,4 @@ class DecisionMaker:
 
     def _save(self) -> None:
         with self._saving:
-            self.experience.save()
+            self.learned.save()

@@ -24,7 +24,7 @@ from patrol_policy.fleet import (
     right_of_way,
 )
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 
 SILENT_STEADY = 2.0
 """A robot is not silent before it has said nothing for this long by the steady clock, seconds: fast

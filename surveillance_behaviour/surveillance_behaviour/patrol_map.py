@@ -11,7 +11,7 @@ from patrol_policy.decision import DecisionSettings
 from patrol_policy.graph import GraphError, PatrolGraph
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
-from surveillance_behaviour.experience import LegTimes
+from surveillance_behaviour.learned_times import LegTimes
 from surveillance_behaviour.ports import Places, Point, UnknownPlaceError
 from surveillance_ontology.robot_ontology import Snapshot
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from patrol_policy.promises import Promise
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from surveillance_ontology.robot_ontology import Snapshot

@@ -14,7 +14,7 @@ from patrol_policy.battery import Battery, Energy
 from patrol_policy.decision import RECHARGE, WAIT, DecisionSettings, energy_of
 from patrol_policy.fleet import FleetOutlook, Intention, RightOfWay
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.world import Decision, World
+from patrol_policy.situation import Decision, Situation
 from state_machines import Interrupt
 from state_machines.exceptions import CallInterruptedError
 from surveillance_behaviour.fleet import FleetKnowledge, share_of
@@ -46,7 +46,7 @@ class Traffic:
     def enter(
         self,
         decision: Decision,
-        world: World,
+        world: Situation,
         battery: Battery,
         visits: Mapping[str, float],
         interrupt: Interrupt,
@@ -83,7 +83,7 @@ class Traffic:
     def begin_whole_charge(self) -> None:
         """Note that the robot charges until it is full."""
 
-    def tell_charge(self, world: World, battery: Battery, now: float) -> None:
+    def tell_charge(self, world: Situation, battery: Battery, now: float) -> None:
         """Publish until when the robot charges, as the level rises."""
 
     def charged(self, now: float) -> None:
@@ -93,7 +93,7 @@ class Traffic:
         """Return whether a charge in passing has had its time."""
         return False
 
-    def who_is_at(self, dock: str, world: World) -> str:
+    def who_is_at(self, dock: str, world: Situation) -> str:
         """Return the other robot that has a dock; empty: none."""
         return ''
 
@@ -127,7 +127,7 @@ class FleetTraffic(Traffic):
     def enter(
         self,
         decision: Decision,
-        world: World,
+        world: Situation,
         battery: Battery,
         visits: Mapping[str, float],
         interrupt: Interrupt,
@@ -174,7 +174,7 @@ class FleetTraffic(Traffic):
         return decision
 
     def _right_of_way(
-        self, wish: Intention, world: World, is_new: bool, interrupt: Interrupt
+        self, wish: Intention, world: Situation, is_new: bool, interrupt: Interrupt
     ) -> RightOfWay:
         fleet, neighbours = self.fleet, world.graph.leg_seconds
         if not fleet.others():
@@ -186,7 +186,7 @@ class FleetTraffic(Traffic):
                 raise CallInterruptedError
         return fleet.right_of_way(neighbours, world.now)
 
-    def _waiting(self, decision: Decision, world: World, reason: str) -> Decision:
+    def _waiting(self, decision: Decision, world: Situation, reason: str) -> Decision:
         self._waits = True
         return replace(
             decision,
@@ -198,7 +198,7 @@ class FleetTraffic(Traffic):
             slot=None,
         )
 
-    def who_is_at(self, dock: str, world: World) -> str:
+    def who_is_at(self, dock: str, world: Situation) -> str:
         assert world.fleet is not None
         for robot in sorted(world.fleet.robots, key=lambda each: each.name):
             if robot.name != self.fleet.name and robot.dock == dock and robot.place == dock:
@@ -238,7 +238,7 @@ class FleetTraffic(Traffic):
         self._charge_until = None
         self.fleet.tell(dock=None, charging_until=None, since=now)
 
-    def tell_charge(self, world: World, battery: Battery, now: float) -> None:
+    def tell_charge(self, world: Situation, battery: Battery, now: float) -> None:
         if self.fleet.own.robot.dock is None:
             return
         energy = energy_of(world, battery, self._settings)
@@ -246,7 +246,7 @@ class FleetTraffic(Traffic):
             self.fleet.tell(charging_until=self._charges_until(now, energy, battery.level))
 
     def _charge_facts(
-        self, world: World, battery: Battery, dock: str | None
+        self, world: Situation, battery: Battery, dock: str | None
     ) -> dict[str, float | None]:
         """Return what the others must know of this robot's battery."""
         energy = energy_of(world, battery, self._settings)

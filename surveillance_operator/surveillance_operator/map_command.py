@@ -24,7 +24,7 @@ from patrol_policy.decision import LONGEST_THRESHOLD, DecisionSettings
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.promises import Promise, promises
 from patrol_policy.promises import lines as promise_lines
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 from strict_files.files import FileError
 from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.patrol_vocabulary import checked_names
@@ -61,7 +61,7 @@ def promised(
         for room, ways in metres.items()
     }
     graph = PatrolGraph(legs, settings.exploration_seconds, rules.exploration)
-    world = World(
+    world = Situation(
         place=place.start,
         now=now,
         reachable=tuple(graph.leg_seconds[place.start]),

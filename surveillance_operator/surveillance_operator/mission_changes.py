@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_operator.mission_state import (
     MachineTransition,
     MissionHistory,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from floor_plans import Grid, Zone
 from floor_plans.shapes import Segment
 from patrol_policy.promises import Promise
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_runtime.incidents import Cause, IncidentUpdate
 
 NO_POINTS: NDArray[np.float64] = np.empty((0, 2))

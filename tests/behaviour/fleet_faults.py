@@ -1,7 +1,7 @@
 """A fleet whose links and programs fail, in this process: what comes of its visits.
 
 Each robot is a host of its own, and the ontology is another one. Deciding, sharing and right of way
-are the real ones (`DecisionMaker`, `FleetKnowledge`, the messages of `fleet_robots`, `Experience`
+are the real ones (`DecisionMaker`, `FleetKnowledge`, the messages of `fleet_robots`, `LearnedTimes`
 with its file and the mission's record); driving is a straight way in its time. A link is cut, or
 loses and delays what passes; the programs of a robot are killed and start again from their files;
 the ontology's host goes down with what it knew on its disk.
@@ -21,12 +21,12 @@ from pathlib import Path
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.fleet import FleetSettings, Layout
 from patrol_policy.rule_table import URGENT, Priorities
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.decision_maker import DecisionMaker
-from surveillance_behaviour.experience import Experience
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
+from surveillance_behaviour.learned_times import LearnedTimes
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ros_adapters.fleet_topic import facts_of, message_of
 from surveillance_behaviour.traffic import FleetTraffic
@@ -136,7 +136,7 @@ class Robot:
             self.world,
             self.world,
             self.world.battery,
-            Experience.of_record(str(self.record)),
+            LearnedTimes.of_record(str(self.record)),
             traffic=FleetTraffic(self.knowledge, settings),
         )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from patrol_policy.decision import DecisionSettings
 from state_machines.testing import watching
-from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.learned_times import LearnedTimes
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import (
@@ -54,11 +54,11 @@ class Run:
         world: World,
         mission_settings: MissionSettings | None = None,
         record: MissionRecord | None = None,
-        experience: Experience | None = None,
+        learned: LearnedTimes | None = None,
     ) -> None:
         self.world = world
         self.mission: Mission = world.mission(
-            mission_settings or settings(), record, machine, experience
+            mission_settings or settings(), record, machine, learned
         )
         self.machine = MACHINES[machine](self.mission)
         self.untaken: set[tuple[str, str, str]] = set()

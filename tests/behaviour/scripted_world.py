@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 
 from floor_plans.parameters import AT_STATION
 from patrol_policy.decision import NowhereToGoError
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError, UnavailableError
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision_maker import DecisionMaker
-from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.learned_times import LearnedTimes
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Point, Ports, UnknownPlaceError
@@ -283,7 +283,7 @@ class World:
         settings: MissionSettings | None = None,
         record: MissionRecord | None = None,
         machine: str = 'surveillance',
-        experience: Experience | None = None,
+        learned: LearnedTimes | None = None,
     ) -> Mission:
         """Return a mission in this world."""
         settings = settings or MissionSettings(settle_seconds=0.0)
@@ -293,7 +293,7 @@ class World:
             self,
             self,
             self.battery,
-            experience,
+            learned,
             warn=self.said.append,
             announce=self.decided,
         )

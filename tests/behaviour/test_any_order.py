@@ -18,7 +18,7 @@ from hypothesis.stateful import (
 )
 
 from patrol_policy.decision import DecisionSettings, energy_of
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import MissionSettings

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import BatteryState
 
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_behaviour import conversions
 from surveillance_interfaces.msg import Decision as DecisionMessage
 from surveillance_runtime.conversions import (

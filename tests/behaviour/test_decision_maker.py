@@ -17,7 +17,7 @@ from floor_plans import PatrolRules
 from patrol_policy.decision import REQUEST, DecisionSettings, NowhereToGoError
 from state_machines import Interrupt
 from surveillance_behaviour.decision_maker import DecisionMaker
-from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.learned_times import LearnedTimes
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_ontology.robot_ontology import Snapshot
 
@@ -27,9 +27,9 @@ NOBODY = Interrupt()
 
 
 def decision_maker(world: World, record: Path) -> DecisionMaker:
-    experience = Experience.of_record(str(record))
-    assert not experience.problem
-    return DecisionMaker(DecisionSettings(), world, world, world.battery, experience)
+    learned = LearnedTimes.of_record(str(record))
+    assert not learned.problem
+    return DecisionMaker(DecisionSettings(), world, world, world.battery, learned)
 
 
 def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
@@ -38,15 +38,15 @@ def test_a_robot_between_two_places_visits_none(tmp_path: Path) -> None:
     model.begin(1.0, NOBODY)
     world.seen_at = 2_500_000_000
     model.decide(4.0, NOBODY)
-    assert model.experience.visits == {'E': 2.5}
+    assert model.learned.visited_at == {'E': 2.5}
     world.seen_at = 0
     model.decide(5.0, NOBODY)
     world.seen_at = 2_500_000_000
     model.decide(6.0, NOBODY)
-    assert model.experience.visits == {'E': 5.0}, 'it was there then'
+    assert model.learned.visited_at == {'E': 5.0}, 'it was there then'
     model.request('E')
     model.decide(7.0, NOBODY)
-    assert model.experience.requested == 'E', 'it is not there'
+    assert model.learned.requested == 'E', 'it is not there'
 
 
 def test_a_request_outlives_the_node_that_took_it(tmp_path: Path) -> None:
@@ -119,7 +119,7 @@ def test_a_clock_that_is_set_back_while_nobody_decides_empties_no_visit(
     told = decision_maker(world, path)
     now = date + 30.0 + after
     told.begin(now, NOBODY)
-    assert told.experience.visits == {'C1': now - 20.0, 'E': now}
+    assert told.learned.visited_at == {'C1': now - 20.0, 'E': now}
 
 
 def test_a_decision_says_which_facts_clash_while_they_do(
@@ -216,7 +216,7 @@ def test_the_shortest_tour_is_looked_for_when_the_map_changes_not_with_each_leg(
     told = DecisionMaker(settings, world, world, world.battery, warn=warnings.append)
     told.begin(1.0, NOBODY)
     for drive in range(5):
-        told.experience.leg_times.observe('E', 'C1', 8.0 + 0.1 * drive, 5.0, 5.0)
+        told.learned.leg_times.observe('E', 'C1', 8.0 + 0.1 * drive, 5.0, 5.0)
         told.look(2.0 + drive, NOBODY)
     assert len(lengths) <= 2, 'a tour for each leg that was learned'
     settings.urgency_threshold = 1.0
@@ -248,8 +248,8 @@ def test_what_was_learned_and_cannot_be_read_is_said(
 ) -> None:
     record = tmp_path / 'events.jsonl'
     damage(tmp_path / 'events.jsonl.experience.json')
-    experience = Experience.of_record(str(record))
-    assert 'what was learned before is not used' in experience.problem
+    learned = LearnedTimes.of_record(str(record))
+    assert 'what was learned before is not used' in learned.problem
 
 
 def test_a_place_that_is_taken_while_somebody_looks_falsifies_no_leg() -> None:
@@ -279,12 +279,12 @@ def test_who_is_sent_home_goes_to_the_station_that_is_next_from_where_the_robot_
     # Since that look it has come elsewhere.
     told.saw('C2', 2.0)
     assert told.request('') == 'the robot goes to R4 when it has ended what it is at'
-    assert told.experience.requested == 'R4'
+    assert told.learned.requested == 'R4'
     told.saw('C1', 3.0)
     assert told.request('') == 'the robot goes to E when it has ended what it is at'
     told.saw('E', 4.0)
     assert told.request('') == 'the robot is in E already'
-    assert told.experience.requested == ''
+    assert told.learned.requested == ''
     told.place = ''
     assert told.request('') == 'the robot goes to E when it has ended what it is at'
     with pytest.raises(ValueError, match='R9'):

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from patrol_policy.battery import LEARNED_FALL, Draw
-from surveillance_behaviour.experience import DrawEstimate
+from surveillance_behaviour.learned_times import DrawEstimate
 
 
 def learnt(rates: list[float], level: float = 100.0) -> Draw:

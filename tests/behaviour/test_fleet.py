@@ -14,7 +14,7 @@ from floor_plans import Station
 from patrol_policy.decision import SHARE, WAIT, DecisionSettings
 from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
 from patrol_policy.rule_table import URGENT, Priorities
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, UnavailableError
 from surveillance_behaviour.decision_maker import DecisionMaker
@@ -263,7 +263,7 @@ def test_of_two_at_a_narrow_door_one_waits_and_says_for_whom() -> None:
         place='R1', intention=Intention('robot2', 'R1', 'C1', -5.0, is_moving=True), now=0.0
     )
     first.world.is_in = 'C1'
-    first.model.experience.requested = 'R1'
+    first.model.learned.requested = 'R1'
     decision = first.model.decide(1.0, NOBODY)
     assert (decision.rule, decision.place) == (WAIT, 'C1')
     assert decision.stay > 0.0
@@ -328,9 +328,9 @@ def test_who_waits_keeps_its_turn_when_it_wants_something_else() -> None:
     way = Intention('robot2', 'R1', 'C1', 0.0, is_moving=True)
     second.fleet.tell(place='R1', intention=way, now=0.0)
     first.world.is_in = 'C1'
-    first.model.experience.requested = 'R1'
+    first.model.learned.requested = 'R1'
     assert first.model.decide(1.0, NOBODY).rule == WAIT
-    first.model.experience.requested = 'R2'
+    first.model.learned.requested = 'R2'
     assert first.model.decide(9.0, NOBODY).place == 'R2'
     assert first.fleet.own.intention.since == 1.0
 
@@ -356,7 +356,7 @@ def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
     assert share is not None
     tour = share.tour
     for step in range(60):  # 0.1 % a second
-        model.experience.draw.observe(now - 60.0 + step, 90.0 - step // 10)
+        model.learned.draw.observe(now - 60.0 + step, 90.0 - step // 10)
     first.world.set_level(60.0)
     first.world.is_in = first.going = 'E'
     model.arrived('E', now)

@@ -8,7 +8,7 @@ import random
 import numpy as np
 import pytest
 
-from surveillance_behaviour.experience import (
+from surveillance_behaviour.learned_times import (
     HUBER,
     PRIOR_SPREAD,
     LegTimes,

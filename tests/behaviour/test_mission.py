@@ -10,7 +10,7 @@ import pytest
 
 from patrol_policy.rule_table import Priorities
 from state_machines.exceptions import CallError, UnavailableError
-from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.learned_times import LearnedTimes
 from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
 from surveillance_runtime.event_log import read, read_all
 
@@ -90,13 +90,13 @@ def test_an_ontology_built_anew_is_told_of_the_visits(machine: str) -> None:
 
 def test_visits_are_known_to_a_process_that_starts_again(machine: str, tmp_path: Path) -> None:
     world, path = World(), str(tmp_path / 'record')
-    Run(machine, world, experience=Experience.of_record(path)).until(200.0)
+    Run(machine, world, learned=LearnedTimes.of_record(path)).until(200.0)
     before = dict(world.visited_at)
     # Ontology and behaviour are gone at once; nothing may count as visited that was not.
     world.visited_at = dict.fromkeys(world.rooms, 0.0)
-    again = Experience.of_record(path)
+    again = LearnedTimes.of_record(path)
     assert again.leg_times.drives
-    Run(machine, world, experience=again).until(212.0)
+    Run(machine, world, learned=again).until(212.0)
     assert all(world.visited_at[place] >= int(time) - 4 for place, time in before.items())
     assert sum(int(world.visited_at[place]) == int(before[place]) for place in before) >= 3
 

@@ -8,7 +8,7 @@ from floor_plans import Station
 from patrol_policy.decision import DecisionSettings
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
-from surveillance_behaviour.experience import LegTimes
+from surveillance_behaviour.learned_times import LegTimes
 from surveillance_behaviour.patrol_map import PatrolMap
 from surveillance_ontology.robot_ontology import Snapshot
 

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
 from patrol_policy.promises import WITHIN, Promise
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.conversions import promises_from
 from surveillance_behaviour.reasoner_node import Reasoner

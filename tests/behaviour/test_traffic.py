@@ -8,7 +8,7 @@ from patrol_policy.battery import Battery
 from patrol_policy.decision import RECHARGE, SHARE, WAIT, DecisionSettings
 from patrol_policy.fleet import DockSlot, FleetRobot, FleetSettings, Intention, Layout
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.world import Decision, World
+from patrol_policy.situation import Decision, Situation
 from state_machines import Interrupt
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_behaviour.traffic import FleetTraffic, Traffic
@@ -23,9 +23,9 @@ def robot(said: list[FleetFacts]) -> FleetTraffic:
     return FleetTraffic(knowledge, DecisionSettings())
 
 
-def known(traffic: Traffic) -> World:
+def known(traffic: Traffic) -> Situation:
     fleet = traffic.outlook(lambda: GRAPH, 10.0)
-    return World('A', 10.0, ('B',), {}, {}, GRAPH, fleet=fleet)
+    return Situation('A', 10.0, ('B',), {}, {}, GRAPH, fleet=fleet)
 
 
 def to(place: str, rule: str = SHARE) -> Decision:

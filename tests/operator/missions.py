@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from floor_plans import Grid
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_operator.mission_state import (
     MissionState,
     Notice,

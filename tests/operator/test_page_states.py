@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid, Zone
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from surveillance_operator.mission_state import (
     MachineContainer,
     MachineTransition,

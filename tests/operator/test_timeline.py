@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from strict_files.files import FileError
 from surveillance_operator.mission_state import MissionState
 from surveillance_operator.recording.timeline import Timeline, TimelineWriter

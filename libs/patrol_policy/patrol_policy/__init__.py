@@ -1,11 +1,12 @@
 """Where a patrol robot goes next: rules, policies within them, the battery, and why.
 
 Begin with ``python -m patrol_policy.demo``, then `decide` in `decision`, the one function that
-decides; it is asked with what is known (`world`), the `battery` and settings. Which class of places
-comes first is in `rule_table`, which of its places in `policies`; the others follow from these.
+decides; it is asked with what is known (`situation`), the `battery` and settings. Which class of
+places comes first is in `rule_table`, which of its places in `policies`; the others follow from
+these.
 
-Public modules: `battery`, `bounds`, `decision`, `fleet`, `graph`, `hours`, `patrolling_sim`,
-`plan`, `policies`, `promises`, `rule_table`, `simulation`, `tour`, `world`.
+Public modules: `battery`, `decision`, `fleet`, `graph`, `hours`, `lower_bounds`, `patrolling_sim`,
+`plan`, `policies`, `promises`, `rule_table`, `simulation`, `tour`, `situation`.
 """
 
 from __future__ import annotations
@@ -25,20 +26,20 @@ if TYPE_CHECKING:
     from patrol_policy.graph import PatrolGraph as PatrolGraph
     from patrol_policy.graph import graph_of_places as graph_of_places
     from patrol_policy.rule_table import Priorities as Priorities
-    from patrol_policy.world import Decision as Decision
-    from patrol_policy.world import World as World
+    from patrol_policy.situation import Decision as Decision
+    from patrol_policy.situation import Situation as Situation
 
 _HOME = {
     'Battery': 'patrol_policy.battery',
     'BatteryLimits': 'patrol_policy.battery',
-    'Decision': 'patrol_policy.world',
+    'Decision': 'patrol_policy.situation',
     'DecisionSettings': 'patrol_policy.decision',
     'GraphError': 'patrol_policy.graph',
     'NowhereToGoError': 'patrol_policy.decision',
     'PatrolGraph': 'patrol_policy.graph',
     'Priorities': 'patrol_policy.rule_table',
     'WhyNot': 'patrol_policy.decision',
-    'World': 'patrol_policy.world',
+    'Situation': 'patrol_policy.situation',
     'decide': 'patrol_policy.decision',
     'graph_of_places': 'patrol_policy.graph',
     'why_not': 'patrol_policy.decision',

@@ -1,7 +1,7 @@
 """Where to go next: charging first, then an operator's request, quiet hours, the rules, the policy.
 
 `decide` is the one function that decides, for both behaviours. It is pure: all that it knows
-comes in as a `World`, a `Battery` and `DecisionSettings`. `why_not` answers from the same steps
+comes in as a `Situation`, a `Battery` and `DecisionSettings`. `why_not` answers from the same steps
 why a place is not chosen.
 
 The rules are classes of places in order of priority (`rule_table`). The first class that has a
@@ -34,7 +34,7 @@ from patrol_policy.rule_table import (
     is_by_waiting,
     priorities_expected,
 )
-from patrol_policy.world import Decision, World
+from patrol_policy.situation import Decision, Situation
 from strict_files.settings import converted, names_expected, parameter, parameters
 from strict_files.suggestions import nearest
 
@@ -108,7 +108,7 @@ class DecisionSettings:
     )
 
 
-def enterable(world: World) -> list[str]:
+def enterable(world: Situation) -> list[str]:
     """Return the places that may be entered next, whatever their class.
 
     Those that could not be reached lately only count when nothing else can be reached.
@@ -126,7 +126,7 @@ def enterable(world: World) -> list[str]:
     return [place for place in reachable if place not in world.avoided] or reachable
 
 
-def candidates(world: World) -> tuple[str, tuple[str, ...]]:
+def candidates(world: Situation) -> tuple[str, tuple[str, ...]]:
     """Return the class whose turn it is and the places that may be chosen, sorted; see `enterable`.
 
     Raises:
@@ -135,12 +135,12 @@ def candidates(world: World) -> tuple[str, tuple[str, ...]]:
     return world.first_of(enterable(world))
 
 
-def is_closed(world: World, place: str) -> bool:
+def is_closed(world: Situation, place: str) -> bool:
     """Return whether a place may not be entered now, or closes before the robot is out of it."""
     return bool(why_closed(world, place))
 
 
-def why_closed(world: World, place: str) -> str:
+def why_closed(world: Situation, place: str) -> str:
     """Return why a place may not be entered now; empty: it may."""
     openings = world.openings
     if place in openings.closed:
@@ -156,7 +156,7 @@ def why_closed(world: World, place: str) -> str:
     return f'it closes in {closes:.0f} s, and a visit takes up to {seconds:.0f} s'
 
 
-def energy_of(world: World, battery: Battery, settings: DecisionSettings) -> Energy | None:
+def energy_of(world: Situation, battery: Battery, settings: DecisionSettings) -> Energy | None:
     """Return what the charge comes to on this map; None: too little is known of the battery.
 
     It is kept with the world's memory as long as nothing has changed.
@@ -182,7 +182,7 @@ def energy_of(world: World, battery: Battery, settings: DecisionSettings) -> Ene
     return found
 
 
-def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decision:
+def decide(world: Situation, battery: Battery, settings: DecisionSettings) -> Decision:
     """Choose where to go next.
 
     Raises:
@@ -193,14 +193,14 @@ def decide(world: World, battery: Battery, settings: DecisionSettings) -> Decisi
     return _decide(world, battery, settings)
 
 
-def _one_move(world: World, decision: Decision) -> Decision:
+def _one_move(world: Situation, decision: Decision) -> Decision:
     """Go only as far as the next place: between robots each way has its own right of way."""
     if decision.place in (world.place, *world.graph.leg_seconds[world.place]):
         return decision
     return replace(decision, place=world.graph.route(world.place, decision.place)[0])
 
 
-def _decide(world: World, battery: Battery, settings: DecisionSettings) -> Decision:
+def _decide(world: Situation, battery: Battery, settings: DecisionSettings) -> Decision:
     if why := why_charge(world, battery, settings):
         return _to_charge(world, settings.recharge_rooms, why)
     if world.requested and world.requested != world.place:
@@ -230,7 +230,7 @@ def _decide(world: World, battery: Battery, settings: DecisionSettings) -> Decis
 
 
 def _shared(
-    world: World, fleet: FleetOutlook, within: World, settings: DecisionSettings
+    world: Situation, fleet: FleetOutlook, within: Situation, settings: DecisionSettings
 ) -> Decision:
     """Choose what the robot's share of the places asks for, as far as the rules allow it.
 
@@ -267,8 +267,8 @@ def _shared(
         common['share'] = Share(choice.share.tour, far)
         step = graph.route(here, far)[0]
         reason = (
-            f'{far} is overdue ({world.wait_in_words(far)}): by the rules no robot of its group '
-            f'came to it'
+            f'{far} is overdue ({world.idleness_in_words(far)}): by the rules no robot of its '
+            f'group came to it'
         )
         return Decision(**common, place=step, target=far, rule=SHARE, reason=reason)
     # It stays where the rules would have it go; but as others pass stops over and overtake it again
@@ -297,20 +297,20 @@ def _shared(
     scores = {
         place: -graph.move(here, place)
         - onward.seconds(place, goal)
-        + world.unvisited(place) * 1e-3
+        + world.idleness_of(place) * 1e-3
         for place in allowed
     }
     best = max(sorted(scores), key=lambda place: scores[place])
     kind = 'place' if rule == ANY else f'{rule} place'
     reason = (
-        f'{best} ({world.wait_in_words(best)}) is the {kind} within reach that is nearest to '
+        f'{best} ({world.idleness_in_words(best)}) is the {kind} within reach that is nearest to '
         f'{goal}; {choice.reason}'
     )
     return Decision(**common, place=best, target=best, rule=rule, reason=reason, scores=scores)
 
 
 def _overdue(
-    world: World,
+    world: Situation,
     fleet: FleetOutlook,
     share: Share,
     onward: Collection[str],
@@ -340,7 +340,7 @@ def _overdue(
     overdue = [
         stop
         for stop in _onward(share)
-        if world.unvisited(stop) > world.threshold_of(stop) + late and can_go(stop)
+        if world.idleness_of(stop) > world.threshold_of(stop) + late and can_go(stop)
     ]
     if not overdue:
         return ''
@@ -373,7 +373,7 @@ def _onward(share: Share) -> tuple[str, ...]:
     return share.tour[first:] + share.tour[:first]
 
 
-def planning_view(world: World, battery: Battery, settings: DecisionSettings) -> World:
+def planning_view(world: Situation, battery: Battery, settings: DecisionSettings) -> Situation:
     """Return the world as the policies see it.
 
     It knows the rules and the charge, and its map has no places that stay closed for longer than a
@@ -395,7 +395,7 @@ def planning_view(world: World, battery: Battery, settings: DecisionSettings) ->
     return replace(world, level=level, graph=graph, priorities=settings.priorities)
 
 
-def _within_range(world: World, energy: Energy | None) -> World:
+def _within_range(world: Situation, energy: Energy | None) -> Situation:
     """Return the world without places that a full charge does not suffice for.
 
     Raises:
@@ -412,7 +412,7 @@ def _within_range(world: World, energy: Energy | None) -> World:
     return replace(world, reachable=near)
 
 
-def _too_far(world: World, place: str, energy: Energy) -> str:
+def _too_far(world: Situation, place: str, energy: Energy) -> str:
     """Return why the charge does not suffice for a place and the way home; empty: it does."""
     seconds = world.graph.move(world.place, place)
     left, least = world.level - energy.draw * seconds, energy.least[energy.index[place]]
@@ -425,7 +425,7 @@ def _too_far(world: World, place: str, energy: Energy) -> str:
     )
 
 
-def _stay(world: World, settings: DecisionSettings, why: str) -> Decision:
+def _stay(world: Situation, settings: DecisionSettings, why: str) -> Decision:
     """Stay at the station, or go to the nearest one to stay there."""
     within = stations_within_reach(world, settings.recharge_rooms)
     if not within and world.openings.opens_in:
@@ -441,7 +441,7 @@ def _stay(world: World, settings: DecisionSettings, why: str) -> Decision:
     return _straight_to(world, best, QUIET, 'station', reason, within)
 
 
-def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> str:
+def why_charge(world: Situation, battery: Battery, settings: DecisionSettings) -> str:
     """Return why the robot must charge now, as a sentence; empty: it need not.
 
     Once it was sent to charge it must until it has: what is too little for the far end of the
@@ -468,7 +468,7 @@ def why_charge(world: World, battery: Battery, settings: DecisionSettings) -> st
     return f'the battery is at {battery.level:g} %, below {required:.1f} % ({words})'
 
 
-def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
+def _to_charge(world: Situation, stations: Sequence[str], why: str) -> Decision:
     """Send the robot to the nearest place where it can charge, wherever that is."""
     within = stations_within_reach(world, stations)
     if not within:
@@ -481,7 +481,7 @@ def _to_charge(world: World, stations: Sequence[str], why: str) -> Decision:
     return _straight_to(world, best, RECHARGE, 'nearest', reason, within)
 
 
-def stations_within_reach(world: World, stations: Sequence[str]) -> dict[str, float]:
+def stations_within_reach(world: Situation, stations: Sequence[str]) -> dict[str, float]:
     """Return the seconds of driving to each charging place within reach, sorted by name."""
     away = {}
     for station in sorted(stations):
@@ -491,7 +491,7 @@ def stations_within_reach(world: World, stations: Sequence[str]) -> dict[str, fl
     return {station: seconds for station, seconds in away.items() if math.isfinite(seconds)}
 
 
-def _as_requested(world: World) -> Decision:
+def _as_requested(world: Situation) -> Decision:
     """Send the robot where an operator wants it."""
     place = world.requested
     if place not in world.graph.index:
@@ -502,26 +502,28 @@ def _as_requested(world: World) -> Decision:
 
 
 def _straight_to(
-    world: World, place: str, rule: str, policy: str, reason: str, away: Mapping[str, float]
+    world: Situation, place: str, rule: str, policy: str, reason: str, away: Mapping[str, float]
 ) -> Decision:
     """Go to a place whatever the rules say; ``away`` has the seconds to each candidate."""
     scores = {candidate: -seconds for candidate, seconds in away.items()}
     return Decision(world.now, world.place, place, place, rule, policy, reason, scores)
 
 
-def _best(world: World, rule: str, allowed: Sequence[str], scores: Scores, policy: str) -> Decision:
+def _best(
+    world: Situation, rule: str, allowed: Sequence[str], scores: Scores, policy: str
+) -> Decision:
     """Take the highest score; among equals the longest unvisited, then the first by name."""
     order = sorted(allowed)
     best = max(
         order,
         key=lambda place: (
             round(scores[place].value, 6),
-            world.unvisited(place),
+            world.idleness_of(place),
             -order.index(place),
         ),
     )
     threshold = f', threshold {world.threshold_of(best):g} s' if is_by_waiting(rule) else ''
-    name = f'{best} ({world.wait_in_words(best)}{threshold})'
+    name = f'{best} ({world.idleness_in_words(best)}{threshold})'
     kind = 'place' if rule == ANY else f'{rule} place'
     if len(allowed) == 1:
         choice = f'{name} is the only reachable {kind}'
@@ -568,7 +570,7 @@ class WhyNot:
     premises: tuple[str, ...] = ()
 
 
-def check_place(place: str, world: World) -> None:
+def check_place(place: str, world: Situation) -> None:
     """Check that a place is on the map, and that an open door leads to it.
 
     Raises:
@@ -582,7 +584,7 @@ def check_place(place: str, world: World) -> None:
     raise ValueError(f'there is no place {place!r} on the map, expected {nearest(place, places)}')
 
 
-def why_not(place: str, world: World, battery: Battery, settings: DecisionSettings) -> WhyNot:
+def why_not(place: str, world: Situation, battery: Battery, settings: DecisionSettings) -> WhyNot:
     """Tell why `decide` would not send the robot to ``place`` now; changes nothing of that.
 
     Raises:
@@ -621,7 +623,7 @@ def why_not(place: str, world: World, battery: Battery, settings: DecisionSettin
         if not decision.scores:  # A share of a fleet's places compares no candidates.
             return WhyNot(f'{instead}: {decision.reason}', premises)
         return WhyNot(
-            f'{place} is not {decision.rule} ({world.wait_in_words(place)}, threshold '
+            f'{place} is not {decision.rule} ({world.idleness_in_words(place)}, threshold '
             f'{world.threshold_of(place):g} s), but {_listed(decision.scores)} '
             f'{"is" if len(decision.scores) == 1 else "are"}; {instead}',
             premises,
@@ -638,7 +640,7 @@ def _listed(names: Mapping[str, float]) -> str:
     return f'{", ".join(rest)} and {last}' if rest else last
 
 
-def _premises(place: str, world: World, rule: str) -> tuple[str, ...]:
+def _premises(place: str, world: Situation, rule: str) -> tuple[str, ...]:
     """Return the facts that a choice of ``place`` rests on, with whether they hold, missing ones
     first.
     """

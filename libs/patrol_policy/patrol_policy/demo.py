@@ -11,13 +11,13 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from patrol_policy.bounds import rule_bound
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.lower_bounds import rule_bound
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES
 from patrol_policy.promises import lines, promises
 from patrol_policy.rule_table import DEFAULT_PRIORITIES, Priorities
 from patrol_policy.simulation import CORRIDOR, ROOM, Patrol
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 WAYS = {
     'E': ['C1', 'C2'],
@@ -50,11 +50,11 @@ def rooms() -> PatrolGraph:
     return graph_of_places(WAYS, POINTS, speed=0.6, exploration_seconds=2.0)
 
 
-def waits_drawn(known: World) -> list[str]:
+def waits_drawn(known: Situation) -> list[str]:
     """Return a bar for each place: how long it has waited; ``|`` is its threshold."""
     drawn = []
     for place in sorted(known.graph.places):
-        waited, limit = known.unvisited(place), known.threshold_of(place)
+        waited, limit = known.idleness_of(place), known.threshold_of(place)
         bar = ('#' * min(2 * BAR, round(BAR * waited / limit))).ljust(BAR)
         bar = bar[:BAR] + '|' + bar[BAR:]
         urgent = ' URGENT' if known.is_urgent(place) else ''

@@ -1,17 +1,17 @@
 """Plans a patrol ahead within the rules and the charge, and follows the plan at each choice.
 
-A plan follows a `Course`: targets on the way in, and a round that is walked again and again.
-Charges are targets like places, put where they cost least. There is one search: `rounds` looks for
-a round with short waits that the rules and the charge allow (simulated annealing). Ways into it are
-then compared by simulating each from where the robot is until the patrol repeats itself
-(`rollout`), which gives the longest wait for ever. So are the walks of the simple policies `oldest`
-and `lookahead`: the plan is never worse than those.
+A `Plan` is targets on the way in, and a cycle that is walked again and again; a `Planner` finds one
+and follows it. Charges are targets like places, put where they cost least. There is one search:
+`cycle_search` looks for a cycle with short waits that the rules and the charge allow (simulated
+annealing). Ways into it are then compared by simulating each from where the robot is until the
+patrol repeats itself (`rollout`), which gives the longest wait for ever. So are the walks of the
+simple policies `oldest` and `lookahead`: the plan is never worse than those.
 
 All that is done at the first choice. Work is counted in steps and not in time, so that the same
 world gives the same mission on a slow machine, too; only `MOST_SECONDS` of the processor's time end
 it early, and the plan then says so.
 
-When times of legs, thresholds, rules or the charge change, a new plan takes over the course as it
+When times of legs, thresholds, rules or the charge change, a new planner takes over the plan as it
 stands, and changes it only for one that leaves less waiting from where the robot is.
 """
 
@@ -25,19 +25,11 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 from patrol_policy.battery import WORTH_CHARGING, Energy
-from patrol_policy.rollout import (
-    Choice,
-    Outcome,
-    RuleMap,
-    State,
-    lookahead,
-    oldest,
-    roll_out,
-    rule_map,
-)
-from patrol_policy.rounds import GOOD_ENOUGH, Round, RoundSearch
+from patrol_policy.cycle_search import GOOD_ENOUGH, Cycle, CycleSearch
+from patrol_policy.rollout import Choice, Outcome, lookahead, oldest, roll_out
+from patrol_policy.rule_graph import PatrolState, RuleGraph, rule_graph
 from patrol_policy.rule_table import HALF_OPEN
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 FIRST_WORK = 360_000.0
 """Work before the first choice of a plan: about microseconds."""
@@ -54,16 +46,16 @@ LEG_CHANGE = 0.1
 MOVE_WORK = 3.0
 """Work of a move that is simulated."""
 HORIZON = 12.0
-"""How many periods a course is simulated at most."""
+"""How many periods a plan is simulated at most."""
 PHASE_STEPS = 60_000
-"""Steps of rounds that are looked at to compare with which target one is begun."""
+"""Steps of cycles that are looked at to compare with which target one is begun."""
 ACCEPTED = 1.03
-"""A wait from visit to visit of so many bounds is accepted for shorter first waits. The round may
+"""A wait from visit to visit of so many bounds is accepted for shorter first waits. The cycle may
 be a little longer than it need be itself, and both together are to stay below 1.05."""
 MOST_POSITIONS = 60
-"""So many positions of a lap are tried for a visit of a place that opens or closes soon."""
+"""So many positions of a cycle are tried for a visit of a place that opens or closes soon."""
 SKIPS = (0.0, 0.3, 0.6)
-"""Targets visited more lately than this may be skipped, in lengths of the round."""
+"""Targets visited more lately than this may be skipped, in lengths of the cycle."""
 SIMPLE: tuple[Choice, ...] = (oldest, lookahead)
 """The simple policies that a plan is never worse than."""
 SIMPLE_UP_TO = 200
@@ -71,12 +63,12 @@ SIMPLE_UP_TO = 200
 
 
 @dataclass(frozen=True)
-class Course:
+class Plan:
     """Targets in the order in which the robot goes to them.
 
     Attributes:
-        targets: The way in and the round.
-        back: Position of the first target of the round, which comes after the last.
+        targets: The way in and the cycle.
+        back: Position of the first target of the cycle, which comes after the last.
         skip: Targets visited more lately than this are skipped, seconds.
         patience: A target that may be entered only when it is URGENT is waited for so long, else
             skipped, seconds.
@@ -87,7 +79,7 @@ class Course:
     skip: float = 0.0
     patience: float = 0.0
 
-    def choose(self, rules: RuleMap, state: State) -> int:
+    def choose(self, rules: RuleGraph, state: PatrolState) -> int:
         """Choose the next place on the way to the next target; see `rollout.Choice`.
 
         Where the rules forbid that, the allowed place that is nearest to the target.
@@ -109,7 +101,7 @@ class Course:
         legs, away = rules.leg_seconds[state.place], rules.away
         return min(allowed, key=lambda o: (legs[o] + away[o][target], state.seen[o], o))
 
-    def _target(self, rules: RuleMap, state: State) -> int:
+    def _target(self, rules: RuleGraph, state: PatrolState) -> int:
         """Move on to the next target that is not to be skipped, and return it."""
         place, times = state.place, state.due or rules.due(state)
         for _ in self.targets:
@@ -145,15 +137,15 @@ class Course:
         """Return the position that comes next."""
         return position + 1 if position + 1 < len(self.targets) else self.back
 
-    def seen_from(self, position: int) -> Course:
-        """Return the same course for a robot that has come to a position of it."""
+    def seen_from(self, position: int) -> Plan:
+        """Return the same plan for a robot that has come to a position of it."""
         if position < self.back:
             return replace(self, targets=self.targets[position:], back=self.back - position)
         around = self.targets[position:] + self.targets[self.back : position]
         return replace(self, targets=around, back=0)
 
 
-def _is_full(rules: RuleMap, state: State, charge: int) -> bool:
+def _is_full(rules: RuleGraph, state: PatrolState, charge: int) -> bool:
     """Return whether a charge would give too little to be worth its while."""
     energy = rules.energy
     assert energy is not None
@@ -161,8 +153,8 @@ def _is_full(rules: RuleMap, state: State, charge: int) -> bool:
     return state.level - energy.draw * away > energy.full - WORTH_CHARGING
 
 
-class Plan:
-    """The course of one robot on one map.
+class Planner:
+    """Finds and follows the plan of one robot on one map.
 
     Args:
         world: Where it begins.
@@ -170,49 +162,51 @@ class Plan:
         before: The plan that this one takes the place of, if there is one.
 
     Attributes:
-        rules: The map with its rules.
+        rule_graph: The map with its rules.
         state: Where the patrol stands.
         cut: What the deadline has cut off, in words; empty: nothing.
     """
 
-    state: State
-    _began: State
-    _lap: float  # Length of the shortest round that is known, rules and charges left aside.
+    state: PatrolState
+    _began: PatrolState
+    _tour_seconds: (
+        float  # Length of the shortest cycle that is known, rules and charges left aside.
+    )
 
     def __init__(
-        self, world: World, energy: Energy | None = None, before: Plan | None = None
+        self, world: Situation, energy: Energy | None = None, before: Planner | None = None
     ) -> None:
         # Processor time of this thread: a busy machine makes the search slower, not worse.
         self._deadline = time.thread_time() + MOST_SECONDS
         # What opens or closes later than that is looked at then.
         self._from, self._changes = world.now, world.changes(world.now + world.look_ahead)
-        self.rules = rules = rule_map(world, energy)
+        self.rule_graph = rules = rule_graph(world, energy)
         self._work = 0.0
         self.cut = ''
         # Waits that began under the plan before count like all others: else each new plan might
-        # turn on the round once, and the places behind would wait for two rounds.
+        # turn on the cycle once, and the places behind would wait for two cycles.
         met = [before is not None] * rules.count
-        self.state = State(world.graph.index[world.place], world.now, [], met)
+        self.state = PatrolState(world.graph.index[world.place], world.now, [], met)
         self._observe(world, 100.0 if energy is None else world.level)
         work = FIRST_WORK * min(1.0, rules.count / FULL_FROM, FULL_UP_TO / rules.count)
         if before and before.places == self.places and before.stations == self.stations:
-            # A warm start: leg times that were learned change the map a little, and the round that
+            # A warm start: leg times that were learned change the map a little, and the cycle that
             # was best is nearly that again.
-            self._lap = before._lap
-            self._begin([before.targets], min(work, WARM_WORK), before.course)
+            self._tour_seconds = before._tour_seconds
+            self._begin([before.targets], min(work, WARM_WORK), before.plan)
         else:
             tour = world.graph.tour
-            self._lap = tour.length
+            self._tour_seconds = tour.length
             # Both ways round: legs and what the rules forbid differ by direction.
             self._begin([tour.order, tour.order[::-1]], work)
 
-    def fits(self, world: World, energy: Energy | None) -> bool:
+    def fits(self, world: Situation, energy: Energy | None) -> bool:
         """Return whether the plan is for this map, these thresholds, rules and stations.
 
         Times and rates that differ a little keep the plan.
         """
-        planned, graph = self.rules.graph, world.graph
-        if world.table is not self.rules.table and world.table != self.rules.table:
+        planned, graph = self.rule_graph.graph, world.graph
+        if world.table is not self.rule_graph.table and world.table != self.rule_graph.table:
             return False
         if world.now < self._from - HALF_OPEN:
             return False
@@ -220,7 +214,7 @@ class Plan:
         due = {change for change in self._changes if world.now < change[1] <= ahead}
         if world.changes(ahead) != due:
             return False
-        mine = self.rules.energy
+        mine = self.rule_graph.energy
         if energy is not mine and (energy is None or not energy.alike(mine)):
             return False
         if graph is planned:
@@ -235,68 +229,68 @@ class Plan:
             for now, then in zip(graph.ways, planned.ways, strict=True)
         )
 
-    def for_a_question(self) -> Plan:
-        """Return a copy that says where its course leads from now on, and changes nothing."""
-        plan = copy(self)
-        plan.state = replace(self.state, met=self.state.met.copy())
-        return plan
+    def for_a_question(self) -> Planner:
+        """Return a copy that says where its plan leads from now on, and changes nothing."""
+        planner = copy(self)
+        planner.state = replace(self.state, met=self.state.met.copy())
+        return planner
 
-    def advance(self, world: World) -> tuple[int, int]:
+    def advance(self, world: Situation) -> tuple[int, int]:
         """Return the stop to go to and the target that it leads to, as indices."""
         self._observe(world, world.level)
-        choice = self._course.choose(self.rules, self.state)
-        target = self._course.targets[self.state.position]
-        stop = self.rules.guarded(self.state, choice)
-        return stop, target if stop < self.rules.count else stop
+        choice = self._plan.choose(self.rule_graph, self.state)
+        target = self._plan.targets[self.state.position]
+        stop = self.rule_graph.guarded(self.state, choice)
+        return stop, target if stop < self.rule_graph.count else stop
 
     @property
     def places(self) -> tuple[str, ...]:
         """The places of the map."""
-        return self.rules.graph.places
+        return self.rule_graph.graph.places
 
     @property
     def stations(self) -> list[int]:
         """The places of the stations, by index."""
-        return self.rules.energy.stations if self.rules.energy else []
+        return self.rule_graph.energy.stations if self.rule_graph.energy else []
 
     @property
     def targets(self) -> tuple[int, ...]:
-        """The best round that was found."""
+        """The best cycle that was found."""
         return self._search.best.targets
 
     @property
-    def course(self) -> Course:
-        """What is left of the course from where the robot is on it."""
-        return self._course.seen_from(self.state.position)
+    def plan(self) -> Plan:
+        """What is left of the plan from where the robot is on it."""
+        return self._plan.seen_from(self.state.position)
 
     @property
     def longest(self) -> float:
-        """The longest wait from visit to visit that the course leaves, seconds.
+        """The longest wait from visit to visit that the plan leaves, seconds.
 
         Where places have time of their own, the first waits count, too.
         """
-        if self.rules.is_even:
+        if self.rule_graph.is_even:
             return self._outcome.settled
-        return max((self._outcome.waits[place] for place in self.rules.wanted), default=0.0)
+        return max((self._outcome.waits[place] for place in self.rule_graph.wanted), default=0.0)
 
     @property
     def repeats(self) -> bool:
-        """Whether it is proven what the course comes to: it leads back to where it was."""
+        """Whether it is proven what the plan comes to: it leads back to where it was."""
         return self._outcome.back is not None
 
     @property
     def missed(self) -> frozenset[str]:
-        """Places that close before the course comes to them, as far as it was looked ahead."""
-        rules = self.rules
+        """Places that close before the plan comes to them, as far as it was looked ahead."""
+        rules = self.rule_graph
         entered = {rules.places[stop] for stop in self._outcome.walk}
         return frozenset(self.places[place] for place in rules.windows if place not in entered)
 
     def settled_waits(self) -> list[float]:
-        """Return for each place the wait from visit to visit that the course leaves, seconds.
+        """Return for each place the wait from visit to visit that the plan leaves, seconds.
 
         inf: the place is not visited.
         """
-        rules, outcome, state = self.rules, self._outcome, self._began.fresh()
+        rules, outcome, state = self.rule_graph, self._outcome, self._began.fresh()
         begin = outcome.repeated_from(rules)
         waits = [math.inf] * rules.count
         for place in rules.windows:
@@ -330,47 +324,45 @@ class Plan:
         """The longest wait from visit to visit that is accepted for shorter first waits."""
         return min(ACCEPTED * self._bound, self._simple)
 
-    def _observe(self, world: World, level: float) -> None:
+    def _observe(self, world: Situation, level: float) -> None:
         """Take where the patrol stands."""
         graph, met = world.graph, self.state.met
         seen = [world.visited_at.get(place, world.since) for place in graph.places]
         index = graph.index
         said = {index[place]: world.said_of(place) for place in world.said if place in index}
-        due = self.rules.table.due_times(world.now, seen, said)
+        due = self.rule_graph.table.due_times(world.now, seen, said)
         here = graph.index[world.place]
         if here != self.state.place:
             met[here] = True
         avoided = frozenset(graph.index[name] for name in world.avoided if name in graph.index)
         position = self.state.position
-        self.state = State(here, world.now, seen, met, avoided, position, level, due)
+        self.state = PatrolState(here, world.now, seen, met, avoided, position, level, due)
 
-    def _begin(
-        self, rounds: list[tuple[int, ...]], work: float, course: Course | None = None
-    ) -> None:
-        """Find the course.
+    def _begin(self, cycles: list[tuple[int, ...]], work: float, plan: Plan | None = None) -> None:
+        """Find the plan.
 
         Args:
-            rounds: Where the search for a round begins.
-            work: For rounds and for courses together.
-            course: One that is followed already; None: the best round is begun.
+            cycles: Where the search for a cycle begins.
+            work: For cycles and for plans together.
+            plan: One that is followed already; None: the best cycle is begun.
         """
-        rules = self.rules
-        self._horizon = HORIZON * max(rules.length(rounds[0]), rules.least_period)
+        rules = self.rule_graph
+        self._horizon = HORIZON * max(rules.length(cycles[0]), rules.least_period)
         if rules.energy:
-            # A course that has not come to its charge yet looks better than it is.
+            # A plan that has not come to its charge yet looks better than it is.
             self._horizon += 2.0 * rules.energy.cycle_seconds
         simple = SIMPLE if rules.count <= SIMPLE_UP_TO else ()
         # The simple policies are simulated first: what they come to is a limit for all that
         # follows, and their walks are starts of the search.
         walks = [self._simulated(choose) for choose in simple]
         self._simple = min((walk.settled for walk in walks if not walk.cut), default=math.inf)
-        starts = [rounds, *(list(rules.laps(walk.walk)) for walk in walks)]
-        self._search = RoundSearch(rules, starts, self._lap)
+        starts = [cycles, *(list(rules.cycles_in(walk.walk)) for walk in walks)]
+        self._search = CycleSearch(rules, starts, self._tour_seconds)
         self._search_on(self._search, 0.7 * work)
-        # A charge on its round takes time that the length of the ways does not tell.
+        # A charge on its cycle takes time that the length of the ways does not tell.
         self._horizon = max(self._horizon, HORIZON * self._search.best.length)
-        self._course = course or self._entered(self._search.best, 0)
-        self._outcome = self._followed(self._course, math.inf)
+        self._plan = plan or self._entered(self._search.best, 0)
+        self._outcome = self._followed(self._plan, math.inf)
         self._began = self.state
         end = self._work + work
         for candidate in self._candidates():
@@ -383,9 +375,9 @@ class Plan:
             self._try(candidate)
         for walk in walks:
             # A walk that comes back to a state that it had before is periodic: it can be followed
-            # as a course, with the waits that were simulated.
+            # as a plan, with the waits that were simulated.
             if (back := walk.repeated_from(rules)) is not None and not walk.cut:
-                self._try(Course(tuple(walk.walk), back, patience=math.inf))
+                self._try(Plan(tuple(walk.walk), back, patience=math.inf))
         self._explain_cut()
 
     def _explain_cut(self) -> None:
@@ -400,17 +392,17 @@ class Plan:
 
         A level above that at which charges end is had once only.
         """
-        state, energy = self.state, self.rules.energy
+        state, energy = self.state, self.rule_graph.energy
         if energy is not None and state.level > energy.full:
             state = replace(state, level=energy.full)
-        outcome = roll_out(self.rules, choose, state, self._horizon, stop, self._late)
+        outcome = roll_out(self.rule_graph, choose, state, self._horizon, stop, self._late)
         self._work += MOVE_WORK * len(outcome.walk)
         return outcome
 
-    def _candidates(self) -> Iterator[Course]:
-        """Yield ways into the rounds, the likeliest first.
+    def _candidates(self) -> Iterator[Plan]:
+        """Yield ways into the cycles, the likeliest first.
 
-        A round that the search has made a little shorter may be harder to come into than the one
+        A cycle that the search has made a little shorter may be harder to come into than the one
         that it began with.
         """
         search = self._search
@@ -418,42 +410,42 @@ class Plan:
             [self._entered(found, phase) for phase in self._phases(found)]
             for found in dict.fromkeys((search.begun, search.best))
         ]
-        for courses in ways:
-            yield from courses[:2]
-        for courses in ways:
-            for course in courses[:2]:
-                yield replace(course, targets=course.targets[::-1])
+        for plans in ways:
+            yield from plans[:2]
+        for plans in ways:
+            for plan in plans[:2]:
+                yield replace(plan, targets=plan.targets[::-1])
         first = ways[-1][0]
         for skip, patience in itertools.product(SKIPS, (0.0, first.patience, math.inf)):
             yield replace(first, skip=skip * self._bound, patience=patience)
         for further in itertools.zip_longest(*(each[2:] for each in ways)):
             yield from filter(None, further)
 
-    def _in_time(self) -> Iterator[Course]:
-        """Yield the best course with one more visit on the first lap of a place that opens or
+    def _in_time(self) -> Iterator[Plan]:
+        """Yield the best plan with one more visit the first time round of a place that opens or
         closes soon, whatever closes first."""
-        windows = self.rules.windows
+        windows = self.rule_graph.windows
 
         def closes(place: int) -> tuple[float, float]:
             known = [(last, first) for first, last in windows[place] if last > self.state.now]
             return min(known, default=(math.inf, math.inf))
 
         for place in sorted(windows, key=closes):
-            course = self._course
-            begun = course.back > 0
-            way, lap = course.targets[: course.back], course.targets[course.back :]
-            way = way if begun else lap
+            plan = self._plan
+            begun = plan.back > 0
+            way, tour = plan.targets[: plan.back], plan.targets[plan.back :]
+            way = way if begun else tour
             for position in range(0, len(way) + 1, max(1, len(way) // MOST_POSITIONS)):
-                targets = (*way[:position], place, *way[position:], *lap)
-                for patience in (course.patience, math.inf):
-                    yield replace(course, targets=targets, back=len(way) + 1, patience=patience)
+                targets = (*way[:position], place, *way[position:], *tour)
+                for patience in (plan.patience, math.inf):
+                    yield replace(plan, targets=targets, back=len(way) + 1, patience=patience)
 
     def _is_finished(self) -> bool:
-        """Return whether no better course is looked for."""
+        """Return whether no better plan is looked for."""
         return self._search.finished and self._outcome.first <= GOOD_ENOUGH * self._bound
 
-    def _search_on(self, search: RoundSearch, work: float) -> None:
-        """Go on looking for a better round."""
+    def _search_on(self, search: CycleSearch, work: float) -> None:
+        """Go on looking for a better cycle."""
         end = search.work + work
         while search.work < end and not search.finished and not self._late():
             search.improve(SLICE_WORK)
@@ -462,28 +454,28 @@ class Plan:
         """Return whether the choice has taken all the time that there is."""
         return time.thread_time() > self._deadline
 
-    def _try(self, course: Course) -> None:
-        """Take a course if it is better from here."""
+    def _try(self, plan: Plan) -> None:
+        """Take a plan if it is better from here."""
         stop = max(1.01 * self._outcome.settled, self._accepted)
-        outcome = self._followed(course, stop)
-        # A better round is no excuse for a longer wait on the way into it: each new plan could
-        # then turn on the round once more.
+        outcome = self._followed(plan, stop)
+        # A better cycle is no excuse for a longer wait on the way into it: each new plan could
+        # then turn on the cycle once more.
         most = max(self._outcome.settled, self._accepted) + 1e-6
         if outcome.settled <= most and self._grade(outcome) < self._grade(self._outcome):
-            self._course, self._outcome = course, outcome
+            self._plan, self._outcome = plan, outcome
             self.state.position = 0
 
-    def _followed(self, course: Course, stop: float) -> Outcome:
-        """Return what a course comes to from here."""
-        return self._simulated(course.choose, stop)
+    def _followed(self, plan: Plan, stop: float) -> Outcome:
+        """Return what a plan comes to from here."""
+        return self._simulated(plan.choose, stop)
 
     def _grade(self, outcome: Outcome) -> tuple[bool, int, int, int, float]:
-        """Return what courses are compared by, less is better, in whole percents of the bound.
+        """Return what plans are compared by, less is better, in whole percents of the bound.
 
         Waits that come again and again count first, as far as they are longer than what is
-        accepted, then those on the way into the round, which come once, then the first waits. A
+        accepted, then those on the way into the cycle, which come once, then the first waits. A
         plan that takes the place of another has long waits behind it: if they counted as much, all
-        rounds would be alike, and the place would be promised what is left of them. Of a course
+        cycles would be alike, and the place would be promised what is left of them. Of a plan
         that was looked at in part only nothing good is known.
         """
         bound = self._bound
@@ -494,20 +486,20 @@ class Plan:
         first = round(100.0 * outcome.first / bound)
         return outcome.cut, late(outcome.lasting), late(outcome.settled), first, outcome.settled
 
-    def _entered(self, found: Round, phase: int) -> Course:
-        """Return the course that begins a round with one of its targets."""
-        targets, rules = found.targets, self.rules
+    def _entered(self, found: Cycle, phase: int) -> Plan:
+        """Return the plan that begins a cycle with one of its targets."""
+        targets, rules = found.targets, self.rule_graph
         wait = max(0.0, rules.least_period - rules.length(targets))
         patience = wait + 2.0 * rules.mean_leg
-        return Course(targets[phase:] + targets[:phase], patience=patience)
+        return Plan(targets[phase:] + targets[:phase], patience=patience)
 
-    def _phases(self, found: Round) -> list[int]:
-        """Return with which targets a round may be begun, the least first waits first.
+    def _phases(self, found: Cycle) -> list[int]:
+        """Return with which targets a cycle may be begun, the least first waits first.
 
-        How long each place would wait follows from the times of the round; what the rules demand
+        How long each place would wait follows from the times of the cycle; what the rules demand
         in between is left to the simulation.
         """
-        rules, state, targets = self.rules, self.state, found.targets
+        rules, state, targets = self.rule_graph, self.state, found.targets
         count, away, here = len(targets), rules.away, state.place
         times = [0.0]
         for before, after in zip(targets, (*targets[1:], targets[0]), strict=True):
@@ -535,10 +527,10 @@ class Plan:
         return sorted(phases, key=lambda phase: (round(longest(phase), 3), phase))
 
 
-def plan_of(world: World, energy: Energy | None = None) -> Plan:
-    """Return the plan that the policy remembers, or a new one that takes over its course."""
-    plan = world.memory.plan
-    if not isinstance(plan, Plan) or not plan.fits(world, energy):
-        before = plan if isinstance(plan, Plan) else None
-        plan = world.memory.plan = Plan(world, energy, before)
-    return plan
+def planner_of(world: Situation, energy: Energy | None = None) -> Planner:
+    """Return the plan that the policy remembers, or a new one that takes over its plan."""
+    planner = world.memory.planner
+    if not isinstance(planner, Planner) or not planner.fits(world, energy):
+        before = planner if isinstance(planner, Planner) else None
+        planner = world.memory.planner = Planner(world, energy, before)
+    return planner

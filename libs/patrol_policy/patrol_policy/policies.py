@@ -1,15 +1,15 @@
 """Policies: how good is each of the places that the rules allow?
 
-A policy is a function from a :class:`World`, the allowed places and what the charge comes to, to a
-:class:`Score` for each place; one that plans ahead may choose to charge instead. It can be changed
-at run time: what it needs to remember (the target it was heading for, a plan, where it draws its
-chance from) stands in the world.
+A policy is a function from a :class:`Situation`, the allowed places and what the charge comes to,
+to a :class:`Score` for each place; one that plans ahead may choose to charge instead. It can be
+changed at run time: what it needs to remember (the target it was heading for, a plan, where it
+draws its chance from) stands in the situation.
 
 ========= ========================================================================================
 seed      any allowed place, at random
 oldest    the allowed place that went unvisited longest
 lookahead the way to wherever on the whole map (time unvisited - time to get there) is highest
-tour      the place next on a round that was planned within the rules to leave the least waiting
+tour      the place next on a cycle that was planned within the rules to leave the least waiting
 ========= ========================================================================================
 
 The literature's policies (CR, HCR, HPCC, cycle), which know no rules, are in the benchmark.
@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patrol_policy.battery import Energy
-from patrol_policy.plan import plan_of
-from patrol_policy.world import Score, World
+from patrol_policy.plan import planner_of
+from patrol_policy.situation import Score, Situation
 from strict_files.suggestions import nearest
 
 Scores = Mapping[str, Score]
@@ -50,7 +50,7 @@ class Policy(Protocol):
     """Scores the allowed places, or chooses to charge."""
 
     def __call__(
-        self, world: World, allowed: Sequence[str], energy: Energy | None = None
+        self, world: Situation, allowed: Sequence[str], energy: Energy | None = None
     ) -> Scores | Charge:
         """Return a score for each of ``allowed``, which is not empty."""
 
@@ -66,21 +66,21 @@ def make_policy(name: str) -> Policy:
     return POLICIES[name]
 
 
-def by_chance(world: World, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
+def by_chance(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
     """Return a random score for each place."""
     generator = world.memory.generator
     return {place: Score(generator.random(), place, 'drawn at random') for place in allowed}
 
 
-def oldest(world: World, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
+def oldest(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
     """Return the time each place went unvisited."""
     scores = {}
     for place in allowed:
-        scores[place] = Score(world.unvisited(place), place, 'the longest wait decides')
+        scores[place] = Score(world.idleness_of(place), place, 'the longest wait decides')
     return scores
 
 
-def lookahead(world: World, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
+def lookahead(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
     """Return the best of (time unvisited - time to get there), by way of each candidate."""
     graph = world.graph
     scores = {}
@@ -94,21 +94,23 @@ def lookahead(world: World, allowed: Sequence[str], energy: Energy | None = None
     return scores
 
 
-def tour(world: World, allowed: Sequence[str], energy: Energy | None = None) -> Scores | Charge:
+def tour(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores | Charge:
     """Return the next place of the plan, then how near each place is to its target; see `plan`."""
-    plan, graph = plan_of(world, energy), world.graph
-    stop, target_stop = plan.advance(world)
-    longest = f'the longest wait on this round is {plan.longest:.1f} s'
-    words = f'{longest} ({plan.cut})' if plan.cut else longest
+    planner, graph = planner_of(world, energy), world.graph
+    stop, target_stop = planner.advance(world)
+    longest = f'the longest wait on this round is {planner.longest:.1f} s'
+    words = f'{longest} ({planner.cut})' if planner.cut else longest
     if stop >= len(graph.places):
-        place = graph.places[plan.rules.places[stop]]
+        place = graph.places[planner.rule_graph.places[stop]]
         return Charge(
             place, f'a charge in {place} costs least now, at {world.level:.1f} %; {words}'
         )
-    next_place, target = graph.places[stop], graph.places[plan.rules.places[target_stop]]
+    next_place, target = graph.places[stop], graph.places[planner.rule_graph.places[target_stop]]
     return {
         place: Score(
-            0.0 if place == next_place else -1.0 - plan.rules.away[graph.index[place]][target_stop],
+            0.0
+            if place == next_place
+            else -1.0 - planner.rule_graph.away[graph.index[place]][target_stop],
             target,
             f'{_way_to(world, place, target) or "it is next on the round"}; {words}',
         )
@@ -116,21 +118,21 @@ def tour(world: World, allowed: Sequence[str], energy: Energy | None = None) -> 
     }
 
 
-def _seconds_by_way_of(world: World, place: str) -> NDArray[np.float64]:
+def _seconds_by_way_of(world: Situation, place: str) -> NDArray[np.float64]:
     """Return the seconds to each place when the robot first goes to ``place``, shape (n,)."""
     graph = world.graph
     seconds = graph.row(graph.index[place])
     return seconds + graph.move(world.place, place)
 
 
-def _way_to(world: World, place: str, target: str) -> str:
+def _way_to(world: Situation, place: str, target: str) -> str:
     """Return where a place leads to in the end; empty when that is the place itself."""
     if place == target:
         return ''
-    return f'it is on the way to {target} ({world.wait_in_words(target)})'
+    return f'it is on the way to {target} ({world.idleness_in_words(target)})'
 
 
-def _towards(world: World, place: str, target: str, seconds: float) -> str:
+def _towards(world: Situation, place: str, target: str, seconds: float) -> str:
     """Return the target and how far away it is."""
     way = _way_to(world, place, target)
     return f'{way}, which is {seconds:.1f} s away' if way else f'it is {seconds:.1f} s away'

@@ -22,9 +22,9 @@ from patrol_policy.decision import (
 from patrol_policy.fleet.assignment import FleetOutlook
 from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, FleetPolicy
-from patrol_policy.plan import plan_of
+from patrol_policy.plan import planner_of
 from patrol_policy.rule_table import RuleTable
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 WITHIN, LATER, NEVER, UNKNOWN = 'within', 'later', 'never', 'unknown'
 CLOSED = 'closed'
@@ -59,7 +59,7 @@ class Promise:
 
 
 def promises(
-    world: World, battery: Battery, settings: DecisionSettings, places: Sequence[str] = ()
+    world: Situation, battery: Battery, settings: DecisionSettings, places: Sequence[str] = ()
 ) -> tuple[Promise, ...]:
     """Return what can be kept of each place, by its name.
 
@@ -83,10 +83,10 @@ def promises(
         cut, by = 'no robot has it in its share', f' by one of {world.fleet.team(world.now)} robots'
         proven = True
     elif settings.policy == 'tour' and world.place in asked.graph.index:
-        plan = plan_of(asked, energy)
-        waits = dict(zip(plan.places, plan.settled_waits(), strict=True))
-        cut = plan.cut or 'none of the ways that were looked at leads there'
-        proven, missed = plan.repeats, plan.missed
+        planner = planner_of(asked, energy)
+        waits = dict(zip(planner.places, planner.settled_waits(), strict=True))
+        cut = planner.cut or 'none of the ways that were looked at leads there'
+        proven, missed = planner.repeats, planner.missed
     found = []
     for place in names:
         threshold = asked.threshold_of(place)
@@ -116,7 +116,7 @@ def promises(
 
 
 def fleet_waits(
-    world: World, settings: DecisionSettings, energy: Energy | None = None
+    world: Situation, settings: DecisionSettings, energy: Energy | None = None
 ) -> dict[str, float]:
     """Return how long each place waits at the latest when a fleet has it, seconds.
 
@@ -175,7 +175,7 @@ def _rehearsed(
     return {place: wait if place in seen else math.inf for place, wait in waits.items()}
 
 
-def _end_of_stretch(place: str, world: World) -> str:
+def _end_of_stretch(place: str, world: Situation) -> str:
     """Return what ends the time in which an open place can be visited, and when."""
     openings = world.openings
     closes = openings.closes_in.get(place, math.inf)
@@ -186,7 +186,7 @@ def _end_of_stretch(place: str, world: World) -> str:
     return f'it closes in {closes:.0f} s'
 
 
-def _timely(place: str, wait: float, threshold: float, world: World, by: str) -> Promise:
+def _timely(place: str, wait: float, threshold: float, world: Situation, by: str) -> Promise:
     """Return the promise for a place that is visited again and again."""
     hours = by + (' while it is open' if place in world.openings.windows else '')
     if world.openings.has_quiet:
@@ -205,8 +205,8 @@ def _timely(place: str, wait: float, threshold: float, world: World, by: str) ->
 
 def _why_never(
     place: str,
-    world: World,
-    asked: World,
+    world: Situation,
+    asked: Situation,
     battery: Battery,
     settings: DecisionSettings,
     energy: Energy | None,
@@ -226,7 +226,7 @@ def _why_never(
     return ''
 
 
-def _remedy(place: str, world: World, energy: Energy) -> str:
+def _remedy(place: str, world: Situation, energy: Energy) -> str:
     """Return what would help a place that the charge does not suffice for."""
     graph, at = world.graph, energy.index[place]
     home, _ = graph.drive_home([place])

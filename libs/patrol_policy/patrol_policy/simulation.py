@@ -14,9 +14,9 @@ from patrol_policy.battery import Battery, BatteryLimits, ChargeCurve, Draw
 from patrol_policy.decision import QUIET, RECHARGE, DecisionSettings, decide
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import NO_CALENDAR, Calendar
-from patrol_policy.plan import Plan
+from patrol_policy.plan import Planner
 from patrol_policy.rule_table import Priorities
-from patrol_policy.world import Decision, PolicyMemory, World
+from patrol_policy.situation import Decision, PolicyMemory, Situation
 
 CORRIDOR, ROOM = 'CORRIDOR', 'ROOM'
 QUIET_STEP = 300.0
@@ -120,9 +120,9 @@ class Patrol:
         }
         self._area = 0.0
 
-    def world(self) -> World:
+    def world(self) -> Situation:
         """Return what the robot knows now."""
-        return World(
+        return Situation(
             place=self.place,
             now=self.now,
             reachable=tuple(sorted(self.graph.leg_seconds[self.place])),
@@ -139,15 +139,15 @@ class Patrol:
         )
 
     @property
-    def plan(self) -> Plan:
+    def planner(self) -> Planner:
         """The plan that is followed.
 
         Raises:
             ValueError: The policy plans nothing ahead, or nothing was decided yet.
         """
-        if not isinstance(self._memory.plan, Plan):
+        if not isinstance(self._memory.planner, Planner):
             raise ValueError(f'{self.policy} has no plan')
-        return self._memory.plan
+        return self._memory.planner
 
     def step(self) -> Decision:
         """Charge if need be, or move to the next place; return the decision behind it."""

@@ -17,15 +17,15 @@ from patrol_policy.battery import (
     Station,
     way_home,
 )
-from patrol_policy.bounds import charge_bound
 from patrol_policy.decision import RECHARGE
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.lower_bounds import charge_bound
 from patrol_policy.promises import LATER, NEVER, WITHIN, promises, summary
-from patrol_policy.rollout import RuleMap
+from patrol_policy.rule_graph import RuleGraph
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
 
-from .worlds import default_ranks, rule_map_of, seven_rooms
+from .worlds import default_ranks, rule_graph_of, seven_rooms
 
 
 def test_what_must_be_left_is_what_driving_home_takes() -> None:
@@ -211,7 +211,7 @@ def test_the_plan_comes_near_the_bound_that_knows_the_charge(seed: int) -> None:
     graph = seven_rooms(draw.uniform(2.0, 300.0))
     reach, charge = draw.uniform(3.0, 12.0), draw.uniform(0.1, 2.0)
     patrol = patrolled(graph, draw.choice((0.5, 1.0)), reach, charge)
-    rules = patrol.world().memory.plan.rules
+    rules = patrol.world().memory.planner.rule_graph
     bound = charge_bound(rules, states=20_000)
     patrol.run.settled = 0.0  # What came before is the way into the round.
     for _ in patrol.until(2.0 * patrol.now):
@@ -220,7 +220,7 @@ def test_the_plan_comes_near_the_bound_that_knows_the_charge(seed: int) -> None:
     assert patrol.run.settled <= 1.1 * bound.low
 
 
-def shortest_lawful_wait(rules: RuleMap, most: int) -> float:
+def shortest_lawful_wait(rules: RuleGraph, most: int) -> float:
     """Return the least longest wait of all periodic walks of up to so many stops, by trying all."""
     energy, best = rules.energy, math.inf
     assert energy is not None
@@ -286,7 +286,7 @@ def test_the_bound_is_that_of_trying_all_walks(
     graph = PatrolGraph(legs, 6.0)
     station = Station('A', ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits())
-    rules = rule_map_of(graph, factor * graph.tour.length, ranks, 0, energy=energy)
+    rules = rule_graph_of(graph, factor * graph.tour.length, ranks, 0, energy=energy)
     bound = charge_bound(rules)
     shortest = shortest_lawful_wait(rules, 6)
     assert bound.low <= shortest + 0.01
@@ -298,7 +298,7 @@ def test_a_station_in_a_dead_end_is_entered_by_a_charge_before_it_is_urgent() ->
     graph = PatrolGraph(legs, 6.0)
     station = Station('A', ChargeCurve.even(4.0))
     energy = Energy(graph, [station], Draw(0.2), 0.0, BatteryLimits())
-    rules = rule_map_of(graph, 5.0 * graph.tour.length, default_ranks(graph), 0, energy=energy)
+    rules = rule_graph_of(graph, 5.0 * graph.tour.length, default_ranks(graph), 0, energy=energy)
     # D waits for its threshold, A does not: the robot charges there.
     assert list(rules.held_periods) == [graph.index['D']]
 

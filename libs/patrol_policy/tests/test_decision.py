@@ -19,10 +19,10 @@ from patrol_policy.decision import (
 )
 from patrol_policy.fleet import FleetOutlook, FleetRobot
 from patrol_policy.hours import ALWAYS_OPEN, Openings
-from patrol_policy.plan import plan_of
+from patrol_policy.plan import planner_of
 from patrol_policy.policies import POLICIES
 from patrol_policy.rule_table import Priorities
-from patrol_policy.world import PolicyMemory
+from patrol_policy.situation import PolicyMemory
 
 from .worlds import seven_rooms, world
 
@@ -98,7 +98,7 @@ def test_a_plan_takes_a_place_that_could_not_be_reached_where_the_others_are_clo
         ),
     )
     assert candidates(replace(asked, priorities=Priorities())) == ('URGENT', ('R1',))
-    plan = plan_of(asked)
+    plan = planner_of(asked)
     assert asked.graph.places[plan.advance(asked)[0]] == 'R1'
 
 
@@ -244,7 +244,7 @@ def test_questions_before_the_first_choice_share_one_plan() -> None:
         place='C1', now=1.0, reachable=tuple(graph.leg_seconds['C1']), graph=graph, memory=memory
     )
     why_not('R1', here, Battery(), DecisionSettings())
-    planned = memory.for_a_question().plan
+    planned = memory.for_a_question().planner
     assert planned is not None
-    assert memory.plan is None
+    assert memory.planner is None
     assert planned.fits(replace(here, priorities=Priorities()), None)

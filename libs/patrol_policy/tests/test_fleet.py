@@ -32,7 +32,7 @@ from patrol_policy.graph import PatrolGraph, graph_of_places
 from patrol_policy.hours import Openings
 from patrol_policy.promises import promises
 from patrol_policy.rule_table import Priorities
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 from .worlds import seven_rooms, world
 
@@ -371,7 +371,7 @@ def test_what_does_not_fit_is_named() -> None:
         fleet_plan(graph, 0)
 
 
-def fleet_world(robots: list[FleetRobot], **changes: object) -> World:
+def fleet_world(robots: list[FleetRobot], **changes: object) -> Situation:
     """Return the seven rooms as the first of some robots knows them."""
     corridors = {'C1', 'C2', 'E'}
     graph = seven_rooms()

@@ -26,8 +26,8 @@ from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, FleetView,
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.promises import fleet_waits
 from patrol_policy.rule_table import Priorities
+from patrol_policy.situation import Situation
 from patrol_policy.tour import tour_length
-from patrol_policy.world import World
 
 from .test_fleet import random_map, ring
 from .test_plan import chain
@@ -257,7 +257,7 @@ def fleet_world(threshold: float, *places: str, priorities: Priorities | None = 
     robots = tuple(
         FleetRobot(f'robot{number}', place, heard_at=0.0) for number, place in enumerate(places)
     )
-    world = World(
+    world = Situation(
         place=places[0],
         now=0.0,
         reachable=tuple(graph.leg_seconds[places[0]]),
@@ -307,7 +307,7 @@ def test_what_is_rehearsed_is_what_comes() -> None:
     )
     assert fleet_waits(world, settings, energy) == found, 'there is no dock'
     docked = FleetSettings(docks=('P00', 'X'), charge_ratio=0.5)
-    charged = World(
+    charged = Situation(
         **{
             **{name: getattr(world, name) for name in world.__dataclass_fields__},
             'fleet': FleetOutlook('robot0', world.fleet.robots, world.graph, docked),

@@ -165,9 +165,9 @@ def test_hours_that_are_changed_during_a_patrol_change_the_plan(before: str, aft
     promises(changed.world(), changed.known_battery(), changed.settings)
     changed.calendar = calendar(after)
     told = promises(changed.world(), changed.known_battery(), changed.settings)
-    plan, fresh = changed.world().memory.plan, patrol(after)
+    plan, fresh = changed.world().memory.planner, patrol(after)
     promises(fresh.world(), fresh.known_battery(), fresh.settings)
-    assert plan.rules.windows == fresh.world().memory.plan.rules.windows
+    assert plan.rule_graph.windows == fresh.world().memory.planner.rule_graph.windows
     assert {each.place for each in told if each.verdict == CLOSED} == {'R3'}
 
 

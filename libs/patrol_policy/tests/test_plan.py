@@ -10,12 +10,12 @@ from functools import cache
 import pytest
 
 from patrol_policy.battery import Battery
-from patrol_policy.bounds import RuleBound, default_table, rule_bound, simple_bound
 from patrol_policy.decision import DecisionSettings, decide
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.lower_bounds import RuleBound, default_table, rule_bound, simple_bound
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
-from patrol_policy.world import PolicyMemory, World
+from patrol_policy.situation import PolicyMemory, Situation
 
 from .worlds import seven_rooms, table_of
 
@@ -224,8 +224,8 @@ def test_a_long_wait_of_the_first_lap_is_not_promised_for_ever(share: float) -> 
         there = patrol.step().place
         known[here, there] = DRIVEN[here, there]
         patrol.graph = of_legs(known)
-        promised.append(max(patrol.plan.settled_waits()))
-    assert max(promised) <= 1.05 * max(knowing.plan.settled_waits())
+        promised.append(max(patrol.planner.settled_waits()))
+    assert max(promised) <= 1.05 * max(knowing.planner.settled_waits())
 
 
 def of_legs(legs: dict[tuple[str, str], float]) -> PatrolGraph:
@@ -246,7 +246,7 @@ def test_places_that_the_ontology_calls_urgent_at_the_start_are_visited_first() 
             for name in graph.places
         }
         decision = decide(
-            World(
+            Situation(
                 place=place,
                 now=now,
                 reachable=reachable,

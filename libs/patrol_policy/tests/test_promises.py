@@ -41,7 +41,7 @@ from patrol_policy.promises import (
 )
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
-from patrol_policy.world import PolicyMemory
+from patrol_policy.situation import PolicyMemory
 
 from .test_plan import chain
 from .worlds import seven_rooms, world
@@ -359,4 +359,4 @@ def test_a_simulated_patrol_counts_waits_charges_and_an_empty_battery() -> None:
     assert careful.run.strandings == 0
     assert careful.run.recharges == careful.run.rules[RECHARGE] > 0
     with pytest.raises(ValueError, match='oldest has no plan'):
-        _ = careful.plan
+        _ = careful.planner

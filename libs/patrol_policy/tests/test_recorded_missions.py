@@ -13,8 +13,8 @@ from patrol_policy import plan as plan_module
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
 
+from .test_cycle_search import one_way
 from .test_plan import EQUAL_LEGS, LONG_LEG, chain, grid, town
-from .test_round_search import one_way
 from .worlds import seven_rooms
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patrol_policy.battery import Battery
-from patrol_policy.bounds import possible_moves, rule_bound
+from patrol_policy.cycle_search import CycleSearch
 from patrol_policy.decision import (
     DecisionSettings,
     NowhereToGoError,
@@ -25,15 +25,16 @@ from patrol_policy.fleet import FleetRobot, FleetSettings
 from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetView
 from patrol_policy.hours import Openings
-from patrol_policy.plan import Plan, plan_of
+from patrol_policy.lower_bounds import possible_moves, rule_bound
+from patrol_policy.plan import Planner, planner_of
 from patrol_policy.promises import LATER, UNKNOWN, promises
-from patrol_policy.rollout import State, lookahead, oldest, rule_map
-from patrol_policy.rounds import RoundSearch
+from patrol_policy.rollout import lookahead, oldest
+from patrol_policy.rule_graph import PatrolState, rule_graph
 from patrol_policy.rule_table import ALERT, ANY, HALF_OPEN, URGENT, ClassRule, Priorities, RuleTable
 from patrol_policy.simulation import Patrol
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
-from .worlds import graphs, rule_map_of, seven_rooms, world
+from .worlds import graphs, rule_graph_of, seven_rooms, world
 
 MONDAY = datetime(2024, 3, 4, 9, 0, tzinfo=UTC).timestamp()
 SUNDAY = MONDAY - 86_400.0
@@ -41,7 +42,7 @@ ENTRIES = (URGENT, 'A', 'B', 'A&URGENT', 'B&A sat-sun', 'C&B mon')
 
 
 @st.composite
-def worlds_with_rules(draw: st.DrawFn) -> World:
+def worlds_with_rules(draw: st.DrawFn) -> Situation:
     """Draw what a robot knows: classes, waits, thresholds, what the ontology says, the hours."""
     graph = draw(graphs())
     now = MONDAY + draw(st.sampled_from([0.0, 0.25]))
@@ -53,7 +54,7 @@ def worlds_with_rules(draw: st.DrawFn) -> World:
     order = draw(st.lists(st.sampled_from(ENTRIES), unique=True, max_size=5))
     here = draw(st.sampled_from(graph.places))
     closed = draw(st.sets(st.sampled_from(graph.places), max_size=2)) - {here}
-    return World(
+    return Situation(
         place=here,
         now=now,
         reachable=tuple(graph.leg_seconds[here]),
@@ -77,7 +78,7 @@ def worlds_with_rules(draw: st.DrawFn) -> World:
     )
 
 
-def in_plain_words(known: World, here: str, urgent: Mapping[str, bool]) -> set[str]:
+def in_plain_words(known: Situation, here: str, urgent: Mapping[str, bool]) -> set[str]:
     """Return the places that may be entered, as the rules' description has it."""
     near = [p for p in known.graph.leg_seconds[here] if p not in known.openings.closed]
     near = [place for place in near if place not in known.avoided] or near
@@ -96,20 +97,20 @@ def in_plain_words(known: World, here: str, urgent: Mapping[str, bool]) -> set[s
     return set(near)
 
 
-def urgent_now(known: World) -> dict[str, bool]:
+def urgent_now(known: Situation) -> dict[str, bool]:
     found = {}
     for place in known.graph.places:
         said, limit = known.said.get(place), known.threshold_of(place)
         if place in known.openings.optional:
             found[place] = bool(said) and ALERT in known.classes[place]
         else:
-            found[place] = known.unvisited(place) > limit if said is None else said
+            found[place] = known.idleness_of(place) > limit if said is None else said
     return found
 
 
 @settings(max_examples=250)
 @given(worlds_with_rules())
-def test_all_who_ask_what_comes_first_are_told_the_same(known: World) -> None:
+def test_all_who_ask_what_comes_first_are_told_the_same(known: Situation) -> None:
     """Decision, plan, searched rounds, bounds, simulation, fleet and promises."""
     graph, index, here = known.graph, known.graph.index, known.place
     urgent = urgent_now(known)
@@ -121,8 +122,8 @@ def test_all_who_ask_what_comes_first_are_told_the_same(known: World) -> None:
         rule, allowed = ANY, ()
     assert set(allowed) == expected
     # The plan, and walks ahead: their state has what was said.
-    rules = rule_map(known)
-    state = Plan(known).state
+    rules = rule_graph(known)
+    state = Planner(known).state
     assert {graph.places[place] for place in rules.allowed(state)} == expected
     for choose in (oldest, lookahead):
         assert graph.places[choose(rules, state)] in (expected or {here})
@@ -133,7 +134,7 @@ def test_all_who_ask_what_comes_first_are_told_the_same(known: World) -> None:
     # Bounds know no hours and nothing that is avoided; places may have been visited at any time.
     always = Openings({}, frozenset(), {}, zone=UTC)
     free = replace(known, said={}, avoided=frozenset(), openings=always)
-    waits = {place: free.unvisited(place) for place in graph.places}
+    waits = {place: free.idleness_of(place) for place in graph.places}
     overdue = {place: waits[place] > free.threshold_of(place) for place in graph.places}
     lawful = {index[place] for place in in_plain_words(free, here, overdue)}
     ages = tuple(round(1000.0 * waits[place]) for place in graph.places)
@@ -155,18 +156,18 @@ def test_all_who_ask_what_comes_first_are_told_the_same(known: World) -> None:
 @settings(max_examples=120)
 @given(worlds_with_rules(), st.data())
 def test_a_round_breaks_the_rules_where_a_robot_that_walks_it_would(
-    known: World, data: st.DataObject
+    known: Situation, data: st.DataObject
 ) -> None:
     always = Openings({}, frozenset(), {}, zone=UTC)
     free = replace(known, said={}, avoided=frozenset(), openings=always)
-    graph, rules = free.graph, rule_map(free)
+    graph, rules = free.graph, rule_graph(free)
     walk = [0]
     for _ in range(data.draw(st.integers(1, 12))):
         walk.append(data.draw(st.sampled_from(sorted(graph.ways[walk[-1]]))))
     walk += [graph.index[name] for name in graph.route(graph.places[walk[-1]], graph.places[0])]
     targets = tuple(walk[1:])
     missing = set(range(rules.count)) - set(targets)
-    search = RoundSearch(rules, [[targets]], graph.tour.length)
+    search = CycleSearch(rules, [[targets]], graph.tour.length)
     resting = set(rules.held_periods)
     seen = dict.fromkeys(graph.places, -math.inf)
     now, place, broken = free.now, graph.places[0], set[int]()
@@ -187,13 +188,13 @@ def test_a_round_breaks_the_rules_where_a_robot_that_walks_it_would(
     assert {step for step in broken - found if targets[step] not in resting} == set()
 
 
-def laboratory(entries: tuple[str, ...], now: float = MONDAY, **more: object) -> World:
+def laboratory(entries: tuple[str, ...], now: float = MONDAY, **more: object) -> Situation:
     """Return the seven rooms, R4 of which is a laboratory; all but C2 wait for 300 s."""
     graph = seven_rooms()
     corridors = {'C1', 'C2', 'E'}
     classes = {p: frozenset({'ROOM', *(['CORRIDOR'] * (p in corridors))}) for p in graph.places}
     classes['R4'] |= {'LAB'}
-    return World(
+    return Situation(
         **{  # type: ignore[arg-type]
             'place': 'C2',
             'now': now,
@@ -227,7 +228,7 @@ def test_a_new_class_is_one_entry_that_all_follow() -> None:
     assert told.sentence.startswith('R3 is not LAB&URGENT (last visit 300.0 s ago')
     assert 'R3 is LAB&URGENT: missing' in told.premises
     # The plan goes there first on a Monday, and is made anew when the class counts no more.
-    plan = plan_of(planning_view(monday, Battery(), settings))
+    plan = planner_of(planning_view(monday, Battery(), settings))
     assert plan.places[plan.advance(monday)[0]] == 'R4'
     sunday = laboratory(ON_WEEKDAYS, SUNDAY, memory=monday.memory)
     assert not plan.fits(sunday, None)
@@ -325,4 +326,5 @@ def test_a_table_is_made_once_as_long_as_nothing_changes() -> None:
     known = world(priorities=Priorities())
     assert replace(known, now=200.0, place='C2').table is known.table
     assert replace(known, threshold=61.0).table is not known.table
-    assert rule_map_of(seven_rooms(), 60.0).due(State(0, 5.0, [0.0] * 7, [True] * 7))[0] > 60.0
+    begin = PatrolState(0, 5.0, [0.0] * 7, [True] * 7)
+    assert rule_graph_of(seven_rooms(), 60.0).due(begin)[0] > 60.0

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from hypothesis import strategies as st
 
 from patrol_policy.battery import Energy
-from patrol_policy.bounds import default_table
 from patrol_policy.graph import PatrolGraph, graph_of_places
-from patrol_policy.rollout import RuleMap
+from patrol_policy.lower_bounds import default_table
+from patrol_policy.rule_graph import RuleGraph
 from patrol_policy.rule_table import URGENT, RuleTable
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 SEVEN_ROOMS = {
     'R1': ['D1'],
@@ -45,7 +45,7 @@ def seven_rooms(exploration_seconds: float = 2.0) -> PatrolGraph:
     return graph_of_places(neighbours, POSITIONS, 1.0, exploration_seconds)
 
 
-def world(**changes: object) -> World:
+def world(**changes: object) -> Situation:
     values: dict[str, object] = {
         'place': 'C1',
         'now': 100.0,
@@ -62,7 +62,7 @@ def world(**changes: object) -> World:
     }
     classes = {**values, **changes}['classes']
     assert isinstance(classes, dict)
-    return World(**{**values, 'said': said_in(classes), **changes})  # type: ignore[arg-type]
+    return Situation(**{**values, 'said': said_in(classes), **changes})  # type: ignore[arg-type]
 
 
 def said_in(classes: Mapping[str, frozenset[str]]) -> dict[str, bool]:
@@ -89,7 +89,7 @@ def table_of(
     return RuleTable(tuple(order), list(ranks), due, limits)
 
 
-def rule_map_of(
+def rule_graph_of(
     graph: PatrolGraph,
     threshold: float,
     ranks: Sequence[int] | None = None,
@@ -98,10 +98,10 @@ def rule_map_of(
     energy: Energy | None = None,
     windows: Mapping[int, Sequence[tuple[float, float]]] | None = None,
     slower: float = 1.0,
-) -> RuleMap:
+) -> RuleGraph:
     """Return a map with rules; default: places with several ways come before those with one."""
     table = table_of(ranks or default_ranks(graph), threshold, urgent, own)
-    return RuleMap(graph, table, energy, windows, slower)
+    return RuleGraph(graph, table, energy, windows, slower)
 
 
 @st.composite

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from floor_plans.parameters import AT_STATION
 from patrol_policy.battery import Battery
 from patrol_policy.decision import QUIET, RECHARGE, REQUEST, DecisionSettings
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Clock, Interrupt
 from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError

@@ -19,14 +19,14 @@ from floor_plans import Station
 from floor_plans.parameters import patrol_rules, stations_in
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.promises import Promise
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
 from strict_files.settings import parameter
 from surveillance_behaviour import conversions
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.decision_maker import DecisionMaker
-from surveillance_behaviour.experience import Experience
+from surveillance_behaviour.learned_times import LearnedTimes
 from surveillance_behaviour.ports import Ontology, Places
 from surveillance_behaviour.ros_adapters.fleet_topic import fleet_of
 from surveillance_behaviour.traffic import FleetTraffic, Traffic
@@ -72,7 +72,7 @@ def decision_maker_of(
     Args:
         node: The node that decides.
         settings: Shared with whoever changes them.
-        memory: Where what was learned is, see `Experience.of_record`.
+        memory: Where what was learned is, see `LearnedTimes.of_record`.
         ontology: The ontology.
         places: Where the places are.
         battery: The battery.
@@ -81,9 +81,9 @@ def decision_maker_of(
     log = node.get_logger()
     stations = described_stations(node, settings.recharge_rooms)
     node.add_on_set_parameters_callback(partial(_stations_expected, stations))
-    experience = Experience.of_record(memory.record)
-    if experience.problem:
-        log.warn(experience.problem)
+    learned = LearnedTimes.of_record(memory.record)
+    if learned.problem:
+        log.warn(learned.problem)
     generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
     topic = OwnedTopic(node, DecisionMessage, 'decision')
     promises_topic = OwnedTopic(node, DiagnosticArray, 'promises')
@@ -121,7 +121,7 @@ def decision_maker_of(
         ontology,
         places,
         battery,
-        experience,
+        learned,
         generator,
         lambda w: log.warn(w),
         announce,

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from patrol_policy.decision import RECHARGE
 from patrol_policy.promises import Promise
 from patrol_policy.rule_table import ANY
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from state_machines.ros import ServiceCaller

@@ -11,7 +11,7 @@ from patrol_policy.battery import Battery
 from patrol_policy.decision import RECHARGE, DecisionSettings, decide
 from patrol_policy.fleet.assignment import FleetChoice, FleetOutlook
 from patrol_policy.fleet.simulation import FleetPolicy, FleetView
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 
 def ruled(
@@ -29,7 +29,7 @@ def ruled(
 
     def choose_place(view: FleetView, name: str) -> FleetChoice:
         graph, here = view.graph, view.robots[name].place
-        world = World(
+        world = Situation(
             place=here,
             now=view.now,
             reachable=tuple(graph.leg_seconds[here]),

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patrol_policy.bounds import Covers, RuleBound, default_table, rule_bound, simple_bound
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.lower_bounds import Covers, RuleBound, default_table, rule_bound, simple_bound
 
+from .test_cycle_search import one_way
 from .test_plan import chain
-from .test_round_search import one_way
 from .worlds import default_ranks, graphs, table_of
 
 

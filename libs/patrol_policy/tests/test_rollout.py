@@ -6,32 +6,33 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patrol_policy.bounds import default_table, rule_bound
+from patrol_policy.cycle_search import CycleSearch
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.plan import Plan
-from patrol_policy.rollout import RuleMap, State, lookahead, oldest, roll_out
-from patrol_policy.rounds import RoundSearch
+from patrol_policy.lower_bounds import default_table, rule_bound
+from patrol_policy.plan import Planner
+from patrol_policy.rollout import lookahead, oldest, roll_out
+from patrol_policy.rule_graph import PatrolState, RuleGraph
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
 
 from .test_plan import chain, grid
-from .worlds import default_ranks, graphs, rule_map_of, seven_rooms
+from .worlds import default_ranks, graphs, rule_graph_of, seven_rooms
 
 
-def rules_of(graph: PatrolGraph, threshold: float) -> RuleMap:
-    return rule_map_of(graph, threshold, default_ranks(graph), 0)
+def rules_of(graph: PatrolGraph, threshold: float) -> RuleGraph:
+    return rule_graph_of(graph, threshold, default_ranks(graph), 0)
 
 
-def searched(rules: RuleMap, work: float) -> RoundSearch:
+def searched(rules: RuleGraph, work: float) -> CycleSearch:
     tour = rules.graph.tour
-    search = RoundSearch(rules, [[tour.order]], tour.length)
+    search = CycleSearch(rules, [[tour.order]], tour.length)
     search.improve(work)
     return search
 
 
-def at_start(graph: PatrolGraph) -> State:
+def at_start(graph: PatrolGraph) -> PatrolState:
     count = len(graph.places)
-    return State(0, 0.0, [0.0] * count, [False] * count)
+    return PatrolState(0, 0.0, [0.0] * count, [False] * count)
 
 
 def test_the_shortest_lawful_round_of_a_grid_is_found() -> None:
@@ -86,7 +87,7 @@ def test_a_plan_keeps_what_it_promises(factor: float) -> None:
     graph = chain(6)
     threshold = factor * graph.tour.length
     patrol = Patrol(graph, Priorities(), 'tour', threshold, graph.places[0])
-    promised = Plan(patrol.world()).longest
+    promised = Planner(patrol.world()).longest
     for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
         pass
     assert patrol.run.settled <= promised + 1e-6
@@ -123,11 +124,11 @@ def test_a_large_map_has_the_same_ways_as_a_small_one(monkeypatch: pytest.Monkey
 def test_the_laps_of_a_walk_each_visit_every_place() -> None:
     rules = rules_of(chain(9), 100.0)
     there_and_back = [*range(9), *range(7, 0, -1)]
-    found = list(rules.laps(there_and_back * 3))
+    found = list(rules.cycles_in(there_and_back * 3))
     assert found
     assert all(set(lap) == set(range(9)) for lap in found)
     three = rules_of(chain(3), 100.0)
-    assert list(three.laps([0, 1, 2, 1, 0])) == [(0, 1, 2), (2, 1, 0)]
+    assert list(three.cycles_in([0, 1, 2, 1, 0])) == [(0, 1, 2), (2, 1, 0)]
 
 
 def test_a_walk_ahead_ends_at_its_horizon_and_with_a_wait_that_is_too_long() -> None:
@@ -147,7 +148,7 @@ def test_the_wait_of_a_place_with_more_time_counts_less() -> None:
     graph = chain(3)
     for own in ({0: 20.0}, {2: 20.0}):
         # All others have 80 s more.
-        rules = rule_map_of(graph, 100.0, default_ranks(graph), 0, own)
-        search = RoundSearch(rules, [[(0, 1, 2, 1)]], graph.tour.length)
+        rules = rule_graph_of(graph, 100.0, default_ranks(graph), 0, own)
+        search = CycleSearch(rules, [[(0, 1, 2, 1)]], graph.tour.length)
         found = search.judged((0, 1, 2, 1))
         assert found.length == pytest.approx(4 * 7.0) == found.wait

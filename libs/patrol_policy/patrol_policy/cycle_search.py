@@ -1,17 +1,17 @@
-"""Searches a closed round through all places that the rules let a robot walk again and again.
+"""Searches a cycle through all places that the rules let a robot walk again and again.
 
-A round is a cyclic list of targets, charges among them; the robot takes the shortest way from each
+A cycle is a cyclic list of targets, charges among them; the robot takes the shortest way from each
 to the next. Walked again and again it is periodic: how long each place went unvisited at each step
 is known, what is left of the charge, and so is whether the rules allow the step. The search makes
-the waits on the round short and the round lawful: its cost is the longest wait plus a penalty for
+the waits on the cycle short and the cycle lawful: its cost is the longest wait plus a penalty for
 each step that the rules or the charge forbid, and simulated annealing (Kirkpatrick et al., 1983)
-changes the round where that costs little. It begins with a short tour, which usually needs a few
+changes the cycle where that costs little. It begins with a short tour, which usually needs a few
 changes: a place beside the way that the rules would force the robot into is taken along, a charge
 is put elsewhere.
 
-Where places may be entered only when they are URGENT, a round can be shorter than they allow. Then
-it begins with further laps through the other places, as many as make it just long enough
-(`filled`). Where that would be very many laps the round stays short, and such places are skipped
+Where places may be entered only when they are URGENT, a cycle can be shorter than they allow. Then
+it begins with further turns through the other places, as many as make it just long enough
+(`filled`). Where that would be very many turns the cycle stays short, and such places are skipped
 until they are due.
 """
 
@@ -26,39 +26,39 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from patrol_policy.battery import WORTH_CHARGING
-from patrol_policy.rollout import RuleMap
+from patrol_policy.rule_graph import RuleGraph
 
 PENALTY = 4.0
 """What a forbidden step costs, in mean legs."""
 HEAT, FILLING_HEAT = 0.04, 0.3
-"""The first temperature of an annealing, in penalties; of one of rounds that are filled."""
+"""The first temperature of an annealing, in penalties; of one of cycles that are filled."""
 FILLING = 0.1
-"""Part of the changes that add a visit where rounds are filled."""
+"""Part of the changes that add a visit where cycles are filled."""
 FILLED_UP_TO = 6.0
-"""Rounds are filled with visits while places wait at most so many shortest rounds."""
+"""Cycles are filled with visits while places wait at most so many shortest cycles."""
 CHARGES = 0.12
 """Part of the changes that add or move a charge where the battery matters."""
 EMPTY = 3.0
 """What it costs to come home with nothing left, in penalties, and once more for each mean leg by
 which the charge is too short."""
 ROTATIONS = 4_000
-"""From so many places of a round further laps are tried, divided by its places."""
+"""From so many places of a cycle further turns are tried, divided by its places."""
 GOOD_ENOUGH = 1.004
 """A longest wait of so many bounds is not improved any further."""
-FIRST_CYCLE = 200_000.0
+FIRST_ANNEALING = 200_000.0
 """Work of the first annealing; each later one takes twice as much as the one before."""
 ALL_WORK = 10e6
-"""Work after which no better round is looked for."""
+"""Work after which no better cycle is looked for."""
 STEP_WORK, TRY_WORK = 0.35, 4.0
-"""Work of a step of a round that is checked, and of a change that is thought of: microseconds."""
+"""Work of a step of a cycle that is checked, and of a change that is thought of: microseconds."""
 
 
 @dataclass(frozen=True)
 class Breach:
-    """A step of a round that the rules forbid.
+    """A step of a cycle that the rules forbid.
 
     Attributes:
-        position: Of the target that the robot heads for, in the round.
+        position: Of the target that the robot heads for, in the cycle.
         instead: The neighbour that comes first by the rules.
     """
 
@@ -67,7 +67,7 @@ class Breach:
 
 
 @dataclass(frozen=True)
-class Round:
+class Cycle:
     """A cyclic list of targets.
 
     Attributes:
@@ -85,29 +85,29 @@ class Round:
     short: float = 0.0
 
 
-class RoundSearch:
+class CycleSearch:
     """A search that can be gone on with; all of it is counted in work, about microseconds.
 
     Args:
         rules: The map.
-        starts: Groups of rounds; the first annealings begin with the best of each group. Visits
+        starts: Groups of cycles; the first annealings begin with the best of each group. Visits
             and charges that they lack are added.
-        lap: Length of the shortest round that is known, rules and charges left aside, seconds.
+        tour: Length of the shortest cycle that is known, rules and charges left aside, seconds.
 
     Attributes:
-        best: The best round so far.
+        best: The best cycle so far.
         begun: The best of those that it began with.
         work: Work done so far.
     """
 
     def __init__(
-        self, rules: RuleMap, starts: Iterable[Iterable[tuple[int, ...]]], lap: float
+        self, rules: RuleGraph, starts: Iterable[Iterable[tuple[int, ...]]], tour: float
     ) -> None:
         self._rules = rules
         periods = {
             place: period
             for place, period in rules.held_periods.items()
-            if period <= FILLED_UP_TO * lap
+            if period <= FILLED_UP_TO * tour
         }
         # What is held for longer is skipped until it is due, which is no breach.
         self._resting = rules.held_periods.keys() - periods
@@ -115,7 +115,7 @@ class RoundSearch:
         # The neighbours that a robot at each place may go to, as far as the charge allows it.
         self._onward = [[o for o in ways if within[o]] for ways in rules.leg_seconds[: rules.count]]
         self._period = max(periods.values(), default=0.0)
-        fills = self._period > lap
+        fills = self._period > tour
         self._heat = FILLING_HEAT if fills else HEAT
         # A place with less time than others is visited more than once.
         self._filling = FILLING if fills or not rules.is_even else 0.0
@@ -126,15 +126,15 @@ class RoundSearch:
         prepared = (
             [round for start in group for round in self._prepared(start)] for group in starts
         )
-        rounds = [min(map(self.judged, group), key=self.cost) for group in prepared if group]
-        rounds = rounds or [self.judged((max(0, rules.charge_from(0)),))]
-        rounds.sort(key=lambda found: (self.cost(found), len(found.targets)))
-        self.best = self.begun = rounds[0]
-        self._starts = rounds
-        self._cycle, self._cycle_end = FIRST_CYCLE / 2.0, 0.0
+        cycles = [min(map(self.judged, group), key=self.cost) for group in prepared if group]
+        cycles = cycles or [self.judged((max(0, rules.charge_from(0)),))]
+        cycles.sort(key=lambda found: (self.cost(found), len(found.targets)))
+        self.best = self.begun = cycles[0]
+        self._starts = cycles
+        self._annealing, self._annealing_end = FIRST_ANNEALING / 2.0, 0.0
 
     def _prepared(self, targets: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-        """Yield a round without what the charge does not allow, with the visits and charges that
+        """Yield a cycle without what the charge does not allow, with the visits and charges that
         it needs."""
         rules = self._rules
         wanted = {*rules.wanted, *range(rules.count, len(rules.places))}
@@ -151,20 +151,20 @@ class RoundSearch:
                 each = with_charges(rules, each)
             yield each
 
-    def cost(self, found: Round) -> float:
-        """Return the longest wait of a round with the penalties for what is forbidden, seconds."""
-        # That a round is shorter than places can be visited on is no merit.
+    def cost(self, found: Cycle) -> float:
+        """Return the longest wait of a cycle with the penalties for what is forbidden, seconds."""
+        # That a cycle is shorter than places can be visited on is no merit.
         cost = max(found.wait, self._rules.least_wait) + self._penalty * len(found.breaches)
         if found.short > 0.0:
             cost += EMPTY * self._penalty * (1.0 + found.short / self._rules.mean_leg)
         return cost
 
-    def judged(self, targets: tuple[int, ...], limit: float = math.inf) -> Round:
-        """Return a round with its length, waits and the steps that the rules forbid.
+    def judged(self, targets: tuple[int, ...], limit: float = math.inf) -> Cycle:
+        """Return a cycle with its length, waits and the steps that the rules forbid.
 
         Args:
-            targets: Of the round.
-            limit: Of the cost; a round that costs more may be judged in part only.
+            targets: Of the cycle.
+            limit: Of the cost; a cycle that costs more may be judged in part only.
         """
         walk, ends = self._walked(targets)
         times, short = self._timed(walk)
@@ -174,10 +174,10 @@ class RoundSearch:
         # More breaches than these cost more than the limit: the count may stop there.
         most = (limit - wait) / max(self._penalty, 1e-9)
         breaches = self._breaches(walk, ends, times, most)
-        return Round(targets, length, wait, tuple(breaches), short)
+        return Cycle(targets, length, wait, tuple(breaches), short)
 
     def _walked(self, targets: tuple[int, ...]) -> tuple[list[int], list[int]]:
-        """Return the stops that a round enters, and where in them each target is."""
+        """Return the stops that a cycle enters, and where in them each target is."""
         rules = self._rules
         walk: list[int] = []
         ends: list[int] = []
@@ -193,7 +193,7 @@ class RoundSearch:
     def _timed(self, walk: list[int]) -> tuple[list[float], float]:
         """Return when each stop of a walk is left, and by how much the charge is too short.
 
-        The level is followed from the last charge on the round, after which it is full.
+        The level is followed from the last charge on the cycle, after which it is full.
         """
         rules, energy, count = self._rules, self._rules.energy, self._rules.count
         legs, now, times = rules.leg_seconds, 0.0, []
@@ -219,7 +219,7 @@ class RoundSearch:
         if last < 0:
             return list(itertools.accumulate(seconds)), sum(seconds)
         # A periodic walk has no beginning: the level at its first step is what is left since the
-        # last charge of the lap before.
+        # last charge of the turn before.
         level = full - draw * sum(seconds[last + 1 :])
         # Of several charges none is a mere excuse for driving without exploring.
         charges = sum(stop >= count for stop in walk)
@@ -264,7 +264,7 @@ class RoundSearch:
 
     @property
     def finished(self) -> bool:
-        """Whether a better round is not looked for: none can be, or very much was tried."""
+        """Whether a better cycle is not looked for: none can be, or very much was tried."""
         best = self.best
         if self.work > ALL_WORK or len(best.targets) < 4:
             return True
@@ -277,15 +277,15 @@ class RoundSearch:
         end = self.work + work
         while self.work < end and not self.finished:
             self.work += TRY_WORK
-            # Simulated annealing (Kirkpatrick, Gelatt and Vecchi, Science 1983) in cycles that get
-            # longer: a short one finds a round that will do, and the search may be ended after any
-            # of them.
-            if self.work > self._cycle_end:
+            # Simulated annealing (Kirkpatrick, Gelatt and Vecchi, Science 1983), again and again
+            # and longer each time: a short one finds a cycle that will do, and the search may be
+            # ended after any of them.
+            if self.work > self._annealing_end:
                 if not self._starts:
-                    self._cycle *= 2.0
-                self._cycle_end = self.work + self._cycle
+                    self._annealing *= 2.0
+                self._annealing_end = self.work + self._annealing
                 self._take(self._starts.pop(0) if self._starts else self.best)
-            cooling = (self._cycle_end - self.work) / self._cycle
+            cooling = (self._annealing_end - self.work) / self._annealing
             heat = self._heat * self._penalty * max(0.0, cooling)
             # A rise of six times the heat is taken once in 400 tries: what costs more is not judged
             # to its end.
@@ -308,22 +308,22 @@ class RoundSearch:
                 if cost < self.cost(self.best) - 1e-9:
                     self.best = found
 
-    def _take(self, found: Round) -> None:
-        """Make a round the one that is changed."""
+    def _take(self, found: Cycle) -> None:
+        """Make a cycle the one that is changed."""
         self._cost = self.cost(found)
-        self._changes = RoundChanges(self._rules, found, self._draw)
+        self._changes = CycleChanges(self._rules, found, self._draw)
 
 
-class RoundChanges:
-    """Random changes of a round; what each adds to the length is known before it is made.
+class CycleChanges:
+    """Random changes of a cycle; what each adds to the length is known before it is made.
 
     Args:
         rules: The map.
-        found: The round.
+        found: The cycle.
         draw: Chance.
     """
 
-    def __init__(self, rules: RuleMap, found: Round, draw: random.Random) -> None:
+    def __init__(self, rules: RuleGraph, found: Cycle, draw: random.Random) -> None:
         self._rules, self._draw = rules, draw
         self._targets = targets = found.targets
         self._breaches = found.breaches
@@ -379,7 +379,7 @@ class RoundChanges:
         return (*rest[:position], place, *rest[position:])
 
     def doubled(self, limit: float) -> tuple[int, ...] | None:
-        """Return the targets with one more visit of a place that is near the round there."""
+        """Return the targets with one more visit of a place that is near the cycle there."""
         targets, away = self._targets, self._rules.away
         position = self._draw.randrange(len(targets))
         before, after = targets[position - 1], targets[position]
@@ -468,12 +468,12 @@ class RoundChanges:
         return rest[:where] + stretch + rest[where:]
 
 
-def filled(rules: RuleMap, targets: tuple[int, ...], period: float) -> tuple[int, ...]:
-    """Return a round that goes on with the places that may always be entered until it is so long.
+def filled(rules: RuleGraph, targets: tuple[int, ...], period: float) -> tuple[int, ...]:
+    """Return a cycle that goes on with the places that may always be entered until it is so long.
 
     Args:
         rules: The map.
-        targets: The round; the further laps keep to its order.
+        targets: The cycle; the further turns keep to its order.
         period: Seconds that it is to take.
     """
     free = [t for t in dict.fromkeys(targets) if t < rules.count and rules.gates[t] < 0]
@@ -491,12 +491,12 @@ def filled(rules: RuleMap, targets: tuple[int, ...], period: float) -> tuple[int
     return tuple(found)
 
 
-def with_charges(rules: RuleMap, targets: Sequence[int]) -> tuple[int, ...]:
-    """Return a round with charges where they are needed: before the charge is too short.
+def with_charges(rules: RuleGraph, targets: Sequence[int]) -> tuple[int, ...]:
+    """Return a cycle with charges where they are needed: before the charge is too short.
 
     Args:
         rules: The map; its energy is known.
-        targets: The round without charges.
+        targets: The cycle without charges.
     """
     energy = rules.energy
     assert energy is not None

@@ -28,7 +28,7 @@ from statistics import fmean, median
 from typing import Any
 
 from patrol_policy.battery import LEARNED_FALL, Draw
-from patrol_policy.world import Decision
+from patrol_policy.situation import Decision
 from strict_files.files import FileError, KeptFile
 from surveillance_behaviour.charge_estimate import ChargeEstimate
 from surveillance_behaviour.mission.mission_log import (
@@ -369,7 +369,7 @@ class DrawEstimate:
 
 
 @dataclass
-class Experience:
+class LearnedTimes:
     """What the robot has learned, kept in a file beside the mission record.
 
     The file is ``<record>.experience.json``: `of_record` makes it from the parameter ``record``.
@@ -380,7 +380,7 @@ class Experience:
 
     Attributes:
         file: Where it is kept.
-        visits: When the robot was in each place last, seconds on the mission's clock.
+        visited_at: When the robot was in each place last, seconds on the mission's clock.
         leg_times: How long the legs take.
         draw: How fast the battery falls.
         charge: How fast the stations charge.
@@ -393,7 +393,7 @@ class Experience:
     """
 
     file: KeptFile = field(default_factory=KeptFile)
-    visits: dict[str, float] = field(default_factory=dict)
+    visited_at: dict[str, float] = field(default_factory=dict)
     leg_times: LegTimes = field(default_factory=LegTimes)
     draw: DrawEstimate = field(default_factory=DrawEstimate)
     charge: ChargeEstimate = field(default_factory=ChargeEstimate)
@@ -406,23 +406,23 @@ class Experience:
     _passed: float | None = None
 
     @classmethod
-    def of_record(cls, record: str) -> Experience:
+    def of_record(cls, record: str) -> LearnedTimes:
         """Return what was learned on the mission of a record; new for an empty name.
 
         The visits in the record itself count: they are on the clock of its end. A file that cannot
         be read counts as none; `problem` says what is wrong with it.
         """
-        experience = cls(KeptFile.of_record(record, '.experience.json'))
-        experience.problem = experience.file.read(experience._take) or experience.left_out
+        learned = cls(KeptFile.of_record(record, '.experience.json'))
+        learned.problem = learned.file.read(learned._take) or learned.left_out
         if record and Path(record).is_file():
             try:
                 account = account_of(read(record))
             except FileError as error:
-                experience.problem = str(error)
-                return experience
-            experience.visits.update(account.visits)
-            experience.now = account.now or 0.0
-        return experience
+                learned.problem = str(error)
+                return learned
+            learned.visited_at.update(account.visits)
+            learned.now = account.now or 0.0
+        return learned
 
     def _take(self, kept: dict[str, Any]) -> None:
         leg_times, draw, charge = LegTimes(), DrawEstimate(), ChargeEstimate()
@@ -432,7 +432,7 @@ class Experience:
         left_out = leg_times.restore(kept['leg_times']) + draw.restore(kept['draw'])
         charge.restore(kept['charge'])
         sent_to_charge, requested = str(kept['sent_to_charge']), str(kept['requested'])
-        self.visits, self.leg_times = visits, leg_times
+        self.visited_at, self.leg_times = visits, leg_times
         self.draw, self.charge = draw, charge
         self.sent_to_charge, self.requested = sent_to_charge, requested
         if left_out:
@@ -442,7 +442,7 @@ class Experience:
         """Write the file, if anything has changed."""
         self.file.write(
             {
-                'visits': {place: round(at, 3) for place, at in self.visits.copy().items()},
+                'visits': {place: round(at, 3) for place, at in self.visited_at.copy().items()},
                 'leg_times': self.leg_times.to_json(),
                 'draw': self.draw.to_json(),
                 'charge': self.charge.to_json(),
@@ -456,7 +456,7 @@ class Experience:
         self.tell_time(now)
         at = now if came is None else min(came, now)
         # What was seen of it since it came there stays, unless that lies ahead of the clock.
-        self.visits[place] = max(at, min(now, self.visits.get(place, at)))
+        self.visited_at[place] = max(at, min(now, self.visited_at.get(place, at)))
 
     def tell_time(self, now: float) -> float:
         """Take the visits with a clock that was set, forget those of another simulation.
@@ -469,12 +469,12 @@ class Experience:
         jump = 0.0
         if passed is not None and self._passed is not None:
             jump = now - self.now - (passed - self._passed)
-        latest = max((self.now, *self.visits.values()))
+        latest = max((self.now, *self.visited_at.values()))
         if is_other_simulation(latest - SIMULTANEOUS, now):
-            self.visits = on_present_clock(self.visits, latest, now)
+            self.visited_at = on_present_clock(self.visited_at, latest, now)
         elif abs(jump) > SIMULTANEOUS:
-            self.visits = {place: at + jump for place, at in self.visits.items()}
+            self.visited_at = {place: at + jump for place, at in self.visited_at.items()}
         elif now < latest - SIMULTANEOUS:
-            self.visits = on_present_clock(self.visits, latest, now)
+            self.visited_at = on_present_clock(self.visited_at, latest, now)
         self.now, self._passed = now, passed
         return jump if abs(jump) > SIMULTANEOUS else 0.0

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from patrol_policy.battery import WORTH_CHARGING
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.rollout import RuleMap
+from patrol_policy.rule_graph import RuleGraph
 from patrol_policy.rule_table import DEFAULT_PRIORITIES, RuleTable
 from patrol_policy.tour import EXACT_UP_TO, shortest_tour
 
@@ -46,7 +46,7 @@ STATES = 100_000
 TICKS = 1000
 """Ticks in a second; ages are whole ticks."""
 
-State = tuple[int, int, tuple[int, ...]]
+Walk = tuple[int, int, tuple[int, ...]]
 """Place, the set of places visited since the search began, and the ticks since each was visited."""
 
 
@@ -75,7 +75,7 @@ def default_table(graph: PatrolGraph, threshold: float) -> RuleTable:
 
 def simple_bound(graph: PatrolGraph, table: RuleTable) -> float:
     """Return a wait from visit to visit that no robot can go below, seconds; see `rule_bound`."""
-    return max(graph.tour.bound, RuleMap(graph, table).least_period)
+    return max(graph.tour.bound, RuleGraph(graph, table).least_period)
 
 
 def rule_bound(
@@ -96,7 +96,7 @@ def rule_bound(
     covers = covers_of(graph)
     if len(covers.core) > CORE_UP_TO:
         return RuleBound(low)
-    search = _Search(RuleMap(graph, table), covers, states)
+    search = _Search(RuleGraph(graph, table), covers, states)
     step = 0.9 * precision
     while high > low * (1.0 + precision):
         limit = min(low * (1.0 + step), (low + high) / 2.0)
@@ -119,7 +119,7 @@ class _Search:
         states: How many states may be visited, over all questions.
     """
 
-    def __init__(self, rules: RuleMap, covers: Covers, states: int) -> None:
+    def __init__(self, rules: RuleGraph, covers: Covers, states: int) -> None:
         self._rules, self._left = rules, states
         self._legs = _legs_in_ticks(rules)
         self._covers = covers
@@ -129,9 +129,9 @@ class _Search:
         longest = round(TICKS * limit) + self._rules.count
         everywhere = (1 << self._rules.count) - 1
         # Whoever goes on for ever comes to the first place.
-        begin: State = (0, 1, (0,) * self._rules.count)
+        begin: Walk = (0, 1, (0,) * self._rules.count)
         path = [(begin, self._moves(begin))]
-        on_path, dead = {begin}, set[State]()
+        on_path, dead = {begin}, set[Walk]()
         while path:
             state, todo = path[-1]
             if not todo:
@@ -154,12 +154,12 @@ class _Search:
             path.append((following, self._moves(following)))
         return False
 
-    def _moves(self, state: State) -> list[tuple[int, int]]:
+    def _moves(self, state: Walk) -> list[tuple[int, int]]:
         """Return the legs that the rules may allow, the place that waited longest last."""
         return possible_moves(self._rules.table, self._legs[state[0]], state)
 
 
-def _legs_in_ticks(rules: RuleMap) -> list[dict[int, int]]:
+def _legs_in_ticks(rules: RuleGraph) -> list[dict[int, int]]:
     """Return for each place its neighbours and the ticks to them."""
     return [
         {other: round(TICKS * seconds) for other, seconds in ways.items()}
@@ -167,9 +167,7 @@ def _legs_in_ticks(rules: RuleMap) -> list[dict[int, int]]:
     ]
 
 
-def possible_moves(
-    table: RuleTable, legs: Mapping[int, int], state: State
-) -> list[tuple[int, int]]:
+def possible_moves(table: RuleTable, legs: Mapping[int, int], state: Walk) -> list[tuple[int, int]]:
     """Return the legs that the rules may allow, the place that waited longest last.
 
     How long a place went unvisited that the search has not met yet is not known: so long at least.
@@ -180,7 +178,7 @@ def possible_moves(
     return sorted(((other, legs[other]) for other in allowed), key=lambda move: ages[move[0]])
 
 
-def _after(state: State, place: int, ticks: int) -> State:
+def _after(state: Walk, place: int, ticks: int) -> Walk:
     """Return the state after a leg to a place."""
     _, met, ages = state
     now = [age + ticks for age in ages]
@@ -231,7 +229,7 @@ class Covers:
         if len(self.core) <= CORE_UP_TO:
             self._table = _shortest_covers(ticks[np.ix_(self.core, self.core)])
 
-    def in_time(self, state: State, longest: int) -> bool:
+    def in_time(self, state: Walk, longest: int) -> bool:
         """Return whether the places that are due before any moment can be visited by then."""
         place, _, ages = state
         table, here = self._table[self._rows[place]], set(self._up[place])
@@ -280,7 +278,7 @@ def _shortest_covers(ticks: NDArray[np.int32]) -> NDArray[np.int32]:
     return cover
 
 
-def charge_bound(rules: RuleMap, precision: float = 0.01, states: int = STATES) -> RuleBound:
+def charge_bound(rules: RuleGraph, precision: float = 0.01, states: int = STATES) -> RuleBound:
     """Return bounds of the least longest wait of a robot whose charges end at the full level.
 
     Args:
@@ -316,7 +314,7 @@ def charge_bound(rules: RuleMap, precision: float = 0.01, states: int = STATES) 
     return RuleBound(low, high)
 
 
-def _relaxed_ways(rules: RuleMap) -> NDArray[np.float64]:
+def _relaxed_ways(rules: RuleGraph) -> NDArray[np.float64]:
     """Return seconds between places that no robot falls below, shape (n, n).
 
     A station may be entered by driving only, as on the way to charge, and left for elsewhere.
@@ -339,7 +337,7 @@ def _tree_length(away: NDArray[np.float64]) -> float:
 
 
 ChargeState = tuple[int, int, tuple[int, ...], int]
-"""A `State`, and for how many ticks the robot was at work since its last charge."""
+"""A `Walk`, and for how many ticks the robot was at work since its last charge."""
 
 
 class _ChargeSearch:
@@ -351,7 +349,7 @@ class _ChargeSearch:
         states: How many states may be visited, over all questions.
     """
 
-    def __init__(self, rules: RuleMap, cover: NDArray[np.int32], states: int) -> None:
+    def __init__(self, rules: RuleGraph, cover: NDArray[np.int32], states: int) -> None:
         energy = rules.energy
         assert energy is not None
         self._rules, self._energy, self._left = rules, energy, states

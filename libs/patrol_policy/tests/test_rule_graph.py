@@ -15,27 +15,22 @@ from patrol_policy.battery import BatteryLimits, ChargeCurve, Draw, Energy, Stat
 from patrol_policy.decision import NowhereToGoError, candidates
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import Openings
-from patrol_policy.rollout import (
-    Choice,
-    RuleMap,
-    State,
-    lookahead,
-    oldest,
-    roll_out,
-    rule_map,
-)
+from patrol_policy.rollout import Choice, lookahead, oldest, roll_out
+from patrol_policy.rule_graph import PatrolState, RuleGraph, rule_graph
 from patrol_policy.rule_table import Priorities
-from patrol_policy.world import World
+from patrol_policy.situation import Situation
 
 from .test_plan import chain
-from .test_tours import hall
-from .worlds import default_ranks, graphs, rule_map_of, seven_rooms, world
+from .test_tour import hall
+from .worlds import default_ranks, graphs, rule_graph_of, seven_rooms, world
 
 
-def open_at(*stretches: tuple[float, float], slower: float = 1.0) -> RuleMap:
+def open_at(*stretches: tuple[float, float], slower: float = 1.0) -> RuleGraph:
     """Return a chain of three places, 5 s of driving and 2 s of exploring each, one with hours."""
     graph = chain(3)
-    return rule_map_of(graph, 100.0, default_ranks(graph), 0, windows={2: stretches}, slower=slower)
+    return rule_graph_of(
+        graph, 100.0, default_ranks(graph), 0, windows={2: stretches}, slower=slower
+    )
 
 
 def test_a_way_is_begun_to_what_is_open_and_can_be_left_in_time() -> None:
@@ -79,7 +74,7 @@ def test_the_next_time_in_which_a_place_is_closed_does_not_count(
 
 def test_the_walk_ahead_waits_for_no_place_while_it_is_closed() -> None:
     rules = open_at((10.0, 50.0), (300.0, 500.0))
-    state = State(0, 0.0, [0.0] * 3, [True] * 3)
+    state = PatrolState(0, 0.0, [0.0] * 3, [True] * 3)
     found = roll_out(rules, oldest, state, 250.0)
     times, at = [], 0
     now = 0.0
@@ -101,7 +96,7 @@ def test_the_laps_of_a_walk_are_its_shortest_stretches_with_all_places(
     graph: PatrolGraph, seed: int
 ) -> None:
     draw = random.Random(seed)
-    rules = rule_map_of(graph, 100.0, default_ranks(graph), 0)
+    rules = rule_graph_of(graph, 100.0, default_ranks(graph), 0)
     count = rules.count
     walk = draw.choices(range(count), k=draw.randint(1, 4 * count))
     expected = []
@@ -110,10 +105,10 @@ def test_the_laps_of_a_walk_are_its_shortest_stretches_with_all_places(
         # None that is shorter ends sooner.
         if starts and (not expected or max(starts) > expected[-1][0]):
             expected.append((max(starts), end))
-    assert list(rules.laps(walk)) == [tuple(walk[s : e + 1]) for s, e in expected]
+    assert list(rules.cycles_in(walk)) == [tuple(walk[s : e + 1]) for s, e in expected]
     # Only the end of a long walk counts.
-    assert list(rules.laps([0] * (4 * count) + [*range(count)] * 4)) == list(
-        rules.laps([*range(count)] * 4)
+    assert list(rules.cycles_in([0] * (4 * count) + [*range(count)] * 4)) == list(
+        rules.cycles_in([*range(count)] * 4)
     )
 
 
@@ -122,15 +117,15 @@ def test_ways_on_a_large_map_are_those_of_a_small_one(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = hall(5, 4, seed)
-    small = rule_map_of(graph, 100.0, default_ranks(graph), 0)
+    small = rule_graph_of(graph, 100.0, default_ranks(graph), 0)
     energy = Energy(graph, [Station('P0000')], Draw(0.1), 0.0, BatteryLimits())
-    charged = rule_map_of(graph, 100.0, default_ranks(graph), 0, energy=energy)
+    charged = rule_graph_of(graph, 100.0, default_ranks(graph), 0, energy=energy)
     for reach in (200, 3):
         monkeypatch.setattr('patrol_policy.graph.ALL_PAIRS_UP_TO', 5)
-        monkeypatch.setattr('patrol_policy.rollout.LOCAL_REACH', reach)
+        monkeypatch.setattr('patrol_policy.rule_graph.LOCAL_REACH', reach)
         other = PatrolGraph(graph.leg_seconds, graph.exploration_seconds)
         energy = Energy(other, [Station('P0000')], Draw(0.1), 0.0, BatteryLimits())
-        large = rule_map_of(other, 100.0, default_ranks(other), 0, energy=energy)
+        large = rule_graph_of(other, 100.0, default_ranks(other), 0, energy=energy)
         for stop, target in itertools.product(range(21), repeat=2):
             assert large.away[stop][target] == pytest.approx(charged.away[stop][target])
         assert small.path(7, 7) == large.path(7, 7) == []
@@ -150,7 +145,7 @@ def test_ways_on_a_large_map_are_those_of_a_small_one(
 
 
 @st.composite
-def worlds_of_rules(draw: st.DrawFn) -> World:
+def worlds_of_rules(draw: st.DrawFn) -> Situation:
     """Draw what a robot knows: classes, waits, thresholds of some places, what it avoids."""
     graph = draw(graphs())
     kinds = [frozenset({'A'}), frozenset({'B'}), frozenset({'A', 'B'}), frozenset({'C'})]
@@ -167,7 +162,7 @@ def worlds_of_rules(draw: st.DrawFn) -> World:
     }
     here = draw(st.sampled_from(graph.places))
     closed = draw(st.sets(st.sampled_from(graph.places), max_size=2)) - {here}
-    return World(
+    return Situation(
         place=here,
         now=100.0,
         reachable=tuple(graph.leg_seconds[here]),
@@ -188,17 +183,17 @@ def worlds_of_rules(draw: st.DrawFn) -> World:
     )
 
 
-def state_of(rules: RuleMap, known: World) -> State:
+def state_of(rules: RuleGraph, known: Situation) -> PatrolState:
     index = known.graph.index
     seen = [known.visited_at[place] for place in known.graph.places]
     avoided = frozenset(index[place] for place in known.avoided)
-    return State(index[known.place], known.now, seen, [True] * rules.count, avoided)
+    return PatrolState(index[known.place], known.now, seen, [True] * rules.count, avoided)
 
 
 @settings(max_examples=150)
 @given(worlds_of_rules())
-def test_a_plan_may_enter_what_the_rules_allow(known: World) -> None:
-    rules = rule_map(known)
+def test_a_plan_may_enter_what_the_rules_allow(known: Situation) -> None:
+    rules = rule_graph(known)
     places = [rules.graph.places[place] for place in rules.allowed(state_of(rules, known))]
     try:
         _, allowed = candidates(known)
@@ -208,16 +203,16 @@ def test_a_plan_may_enter_what_the_rules_allow(known: World) -> None:
     if allowed:
         index, graph = known.graph.index, known.graph
         choice = graph.places[oldest(rules, state_of(rules, known))]
-        longest = max(known.unvisited(place) for place in allowed)
+        longest = max(known.idleness_of(place) for place in allowed)
         assert choice in allowed
-        assert known.unvisited(choice) == longest
+        assert known.idleness_of(choice) == longest
         ahead = graph.places[lookahead(rules, state_of(rules, known))]
         assert ahead in allowed
 
         def worth(place: str) -> float:
             way = rules.leg_seconds[index[known.place]][index[place]]
             return max(
-                known.unvisited(other) - way - graph.seconds(place, other)
+                known.idleness_of(other) - way - graph.seconds(place, other)
                 for other in graph.places
                 if other != known.place
             )
@@ -228,7 +223,7 @@ def test_a_plan_may_enter_what_the_rules_allow(known: World) -> None:
         assert lookahead(rules, state_of(rules, known)) == index_of_place(known)
 
 
-def index_of_place(known: World) -> int:
+def index_of_place(known: Situation) -> int:
     return known.graph.index[known.place]
 
 
@@ -243,14 +238,14 @@ def test_the_rules_of_a_world_become_ranks() -> None:
         priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')),
         own_thresholds={'R1': 9.0},
     )
-    rules = rule_map(asked)
+    rules = rule_graph(asked)
     index = asked.graph.index
     assert [rules.table.base[index[place]] for place in ('C1', 'R1', 'R2', 'E')] == [1, 2, 3, 3]
     assert set(rules.table.urgent) == {0}
     assert [rules.table.limits[index[place]] for place in ('C1', 'R1')] == [60.0, 9.0]
-    assert not rule_map(replace(asked, priorities=Priorities(('ROOM',)))).table.has_urgent
+    assert not rule_graph(replace(asked, priorities=Priorities(('ROOM',)))).table.has_urgent
     # Nothing is URGENT then, whatever waits.
-    assert rule_map(replace(asked, priorities=Priorities(('ROOM',)))).held_periods == {}
+    assert rule_graph(replace(asked, priorities=Priorities(('ROOM',)))).held_periods == {}
 
 
 def test_what_opens_after_the_time_that_a_plan_knows_is_not_known() -> None:
@@ -260,7 +255,7 @@ def test_what_opens_after_the_time_that_a_plan_knows_is_not_known() -> None:
 
     def windows(*stretches: tuple[float, float]) -> object:
         openings = Openings({}, frozenset(), {}, windows={'R1': stretches, 'R99': stretches})
-        return rule_map(replace(asked, openings=openings)).windows
+        return rule_graph(replace(asked, openings=openings)).windows
 
     at = asked.graph.index['R1']
     assert windows((900.0, ahead)) == {at: ((900.0, ahead),)}
@@ -274,7 +269,7 @@ def test_what_opens_after_the_time_that_a_plan_knows_is_not_known() -> None:
     assert windows((1000.0, ahead + 9.0)) == {}
 
 
-def charged(reach: float = 200.0, stations: tuple[str, ...] = ('E',)) -> RuleMap:
+def charged(reach: float = 200.0, stations: tuple[str, ...] = ('E',)) -> RuleGraph:
     graph = seven_rooms()
     energy = Energy(
         graph,
@@ -283,14 +278,14 @@ def charged(reach: float = 200.0, stations: tuple[str, ...] = ('E',)) -> RuleMap
         0.0,
         BatteryLimits(0.0, 90.0, 5.0),
     )
-    return rule_map_of(graph, 60.0, default_ranks(graph), 0, energy=energy)
+    return rule_graph_of(graph, 60.0, default_ranks(graph), 0, energy=energy)
 
 
 def test_a_move_takes_time_and_charge_and_a_charge_gives_it_back() -> None:
     rules = charged()
     energy, index = rules.energy, rules.graph.index
     assert energy is not None
-    state = State(index['C1'], 10.0, [0.0] * 7, [True] * 7, level=60.0)
+    state = PatrolState(index['C1'], 10.0, [0.0] * 7, [True] * 7, level=60.0)
     leg = rules.graph.leg_seconds['C1']['R1'] + 2.0
     assert rules.go(state, index['R1']) == state.now == 10.0 + leg
     assert state.place == index['R1']
@@ -304,7 +299,7 @@ def test_a_move_takes_time_and_charge_and_a_charge_gives_it_back() -> None:
     assert state.now == pytest.approx(arrived + (90.0 - level) / 2.0 + 3.0)
     assert state.place == index['E']
     assert state.level == 90.0
-    full = State(index['E'], 0.0, [0.0] * 7, [True] * 7, level=100.0)
+    full = PatrolState(index['E'], 0.0, [0.0] * 7, [True] * 7, level=100.0)
     rules.go(full, 7)
     assert full.level == pytest.approx(100.0 - 3.0 * energy.draw)
     assert math.isinf(rules.go(replace(full, place=index['R1']), index['R2']))
@@ -317,7 +312,7 @@ def test_a_robot_goes_where_it_comes_home_from_else_it_charges() -> None:
     goal = index['R2']
     way = rules.away[index['C1']][goal]
     least = energy.least[goal] + energy.draw * way
-    enough = State(index['C1'], 0.0, [0.0] * 7, [True] * 7, level=least + 1e-9)
+    enough = PatrolState(index['C1'], 0.0, [0.0] * 7, [True] * 7, level=least + 1e-9)
     low = replace(enough, level=least - 1e-6)
     assert rules.affords(enough, goal)
     assert not rules.affords(low, goal)
@@ -332,24 +327,24 @@ def test_a_robot_goes_where_it_comes_home_from_else_it_charges() -> None:
     far = charged(reach=20.0)
     assert far.guarded(stuck, index['R2']) == index['E']
     assert far.guarded(replace(stuck, level=89.0), index['R2']) == 7
-    without = rule_map_of(rules.graph, 60.0, default_ranks(rules.graph), 0)
+    without = rule_graph_of(rules.graph, 60.0, default_ranks(rules.graph), 0)
     assert without.charge_from(0) == -1
     assert without.affords(low, goal)
 
 
 def test_slack_is_how_much_later_than_others_a_place_may_be_visited() -> None:
     graph = chain(4)
-    plain = rule_map_of(graph, 50.0, default_ranks(graph), 0)
+    plain = rule_graph_of(graph, 50.0, default_ranks(graph), 0)
     assert (plain.is_even, plain.slack) == (True, [0.0] * 4)
-    own = rule_map_of(graph, 50.0, default_ranks(graph), 0, {1: 80.0, 2: math.inf, 3: 20.0})
+    own = rule_graph_of(graph, 50.0, default_ranks(graph), 0, {1: 80.0, 2: math.inf, 3: 20.0})
     assert not own.is_even
     # What never is URGENT waits as long as the longest of the others.
     assert own.slack == [30.0, 60.0, 60.0, 0.0]
-    never = rule_map_of(graph, math.inf, default_ranks(graph), 0)
+    never = rule_graph_of(graph, math.inf, default_ranks(graph), 0)
     assert (never.is_even, never.slack) == (False, [0.0] * 4)
     # Out of reach of the charge.
     far = Energy(graph, [Station('P0')], Draw(2.5), 0.0, BatteryLimits(0.0, 90.0, 5.0))
-    reached = rule_map_of(graph, 50.0, default_ranks(graph), 0, energy=far)
+    reached = rule_graph_of(graph, 50.0, default_ranks(graph), 0, energy=far)
     assert reached.wanted == [0, 1, 2]
     assert reached.slack == [0.0, 0.0, 0.0, math.inf, 0.0]
     assert reached.is_even
@@ -357,50 +352,50 @@ def test_slack_is_how_much_later_than_others_a_place_may_be_visited() -> None:
 
 def test_ends_of_corridors_are_held_until_they_are_urgent() -> None:
     graph = chain(4)
-    rules = rule_map_of(graph, 50.0, default_ranks(graph), 0, {3: math.inf})
+    rules = rule_graph_of(graph, 50.0, default_ranks(graph), 0, {3: math.inf})
     assert rules.gates == [1, -1, -1, 2]
     assert rules.held_periods == {0: pytest.approx(57.0, abs=0.01)}
     assert rules.least_period == pytest.approx(57.0, abs=0.01)
     assert rules.mean_leg == 7.0
     # Where URGENT does not come before the others, nothing is held for it.
-    assert rule_map_of(graph, 50.0, default_ranks(graph), None).gates == [-1] * 4
-    assert rule_map_of(graph, 50.0, [2, 1, 1, 1], 0).gates == [1, -1, -1, -1]
-    assert rule_map_of(graph, 50.0, [1, 1, 1, 1], 0).gates == [-1] * 4
-    even = rule_map_of(graph, 50.0, [1, 1, 1, 1], 0)
+    assert rule_graph_of(graph, 50.0, default_ranks(graph), None).gates == [-1] * 4
+    assert rule_graph_of(graph, 50.0, [2, 1, 1, 1], 0).gates == [1, -1, -1, -1]
+    assert rule_graph_of(graph, 50.0, [1, 1, 1, 1], 0).gates == [-1] * 4
+    even = rule_graph_of(graph, 50.0, [1, 1, 1, 1], 0)
     assert (even.least_period, even.least_wait, even.least_round) == (0.0, 0.0, graph.tour.length)
-    held = rule_map_of(graph, 50.0, default_ranks(graph), 0)
+    held = rule_graph_of(graph, 50.0, default_ranks(graph), 0)
     assert held.least_round == held.least_period == held.least_wait
     # The place with the longest period has more time.
-    later = rule_map_of(graph, 50.0, default_ranks(graph), 0, {0: 70.0})
+    later = rule_graph_of(graph, 50.0, default_ranks(graph), 0, {0: 70.0})
     assert later.least_period == pytest.approx(77.0, abs=0.01)
     assert later.least_wait == pytest.approx(57.0, abs=0.01)
 
 
 def test_any_station_is_afforded() -> None:
     rules = charged(stations=('E', 'R4'))
-    low = State(rules.graph.index['C1'], 0.0, [0.0] * 7, [True] * 7, level=1.0)
+    low = PatrolState(rules.graph.index['C1'], 0.0, [0.0] * 7, [True] * 7, level=1.0)
     assert rules.affords(low, 7)
     assert rules.affords(low, 8)
     assert rules.guarded(low, 8) == 8
 
 
 @st.composite
-def patrolled_maps(draw: st.DrawFn) -> tuple[RuleMap, State]:
+def patrolled_maps(draw: st.DrawFn) -> tuple[RuleGraph, PatrolState]:
     """Draw a map with rules and thresholds that differ, and where a patrol stands on it."""
     graph = draw(graphs(most=6))
     count = len(graph.places)
     ranks = draw(st.lists(st.integers(1, 3), min_size=count, max_size=count))
     own = draw(st.dictionaries(st.integers(0, count - 1), st.sampled_from([20.0, 90.0])))
-    rules = rule_map_of(graph, draw(st.sampled_from([15.0, 60.0, 200.0])), ranks, 0, own)
+    rules = rule_graph_of(graph, draw(st.sampled_from([15.0, 60.0, 200.0])), ranks, 0, own)
     seen = [-float(draw(st.integers(0, 80))) for _ in range(count)]
     met = draw(st.lists(st.booleans(), min_size=count, max_size=count))
-    return rules, State(draw(st.integers(0, count - 1)), 0.0, seen, met)
+    return rules, PatrolState(draw(st.integers(0, count - 1)), 0.0, seen, met)
 
 
 @settings(max_examples=30)
 @given(patrolled_maps(), st.sampled_from([oldest, lookahead]))
 def test_a_walk_ahead_comes_to_what_walking_it_comes_to(
-    drawn: tuple[RuleMap, State], choose: Choice
+    drawn: tuple[RuleGraph, PatrolState], choose: Choice
 ) -> None:
     rules, begin = drawn
     before = replace(begin, seen=begin.seen.copy(), met=begin.met.copy())
@@ -428,7 +423,7 @@ def test_a_walk_ahead_comes_to_what_walking_it_comes_to(
         # From there on it does the same again, in steps as long as before.
         lap = found.walk[found.back :]
         assert lap
-        state = State(place, now, seen.copy(), met)
+        state = PatrolState(place, now, seen.copy(), met)
         for stop in lap:
             assert rules.guarded(state, choose(rules, state)) == stop
             rules.go(state, stop)
@@ -446,11 +441,11 @@ def test_a_walk_ahead_is_cut_where_there_is_no_time_or_it_takes_too_many_moves(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     graph = chain(3)
-    rules = rule_map_of(graph, 100.0, [1, 1, 1], 9)
-    begin = State(0, 0.0, [0.0] * 3, [False] * 3)
+    rules = rule_graph_of(graph, 100.0, [1, 1, 1], 9)
+    begin = PatrolState(0, 0.0, [0.0] * 3, [False] * 3)
     draw = random.Random(2)
 
-    def wander(_: RuleMap, state: State) -> int:
+    def wander(_: RuleGraph, state: PatrolState) -> int:
         # Never the same state again.
         state.position = draw.randrange(10**9)
         return 1 if state.place != 1 else draw.choice((0, 2))

@@ -30,12 +30,12 @@ class PolicyMemory:
 
     Attributes:
         generator: Where the random policies draw from.
-        plan: What a policy that plans ahead has planned; see `patrol_policy.plan`.
+        planner: What a policy that plans ahead has planned; see `patrol_policy.plan`.
         energy: What the charge comes to on the maps of the last decision.
     """
 
     generator: random.Random = field(default_factory=random.Random)
-    plan: Any = None
+    planner: Any = None
     energy: dict[Any, Energy] = field(default_factory=dict)
     _part: tuple[Any, PatrolGraph] | None = field(default=None, init=False, repr=False)
     _table: tuple[Any, Any, RuleTable] | None = field(default=None, init=False, repr=False)
@@ -52,7 +52,7 @@ class PolicyMemory:
             self._part = (key, rest.connected(place))
         return self._part[1]
 
-    def table_of(self, situation: World, order: tuple[str, ...]) -> RuleTable:
+    def table_of(self, situation: Situation, order: tuple[str, ...]) -> RuleTable:
         """Return the rules of a situation as a table; the same one as long as nothing changes."""
         places, optional = situation.graph.places, situation.openings.optional
         key = (order, places, situation.threshold, situation.own_thresholds, optional)
@@ -68,14 +68,14 @@ class PolicyMemory:
 
         Before the first choice, what one question has planned serves the next questions.
         """
-        plan = self.plan or (self._asked and self._asked.plan)
-        plan = plan and plan.for_a_question()
-        self._asked = PolicyMemory(copy(self.generator), plan, self.energy.copy())
+        planner = self.planner or (self._asked and self._asked.planner)
+        planner = planner and planner.for_a_question()
+        self._asked = PolicyMemory(copy(self.generator), planner, self.energy.copy())
         return self._asked
 
 
 @dataclass(frozen=True, eq=False)
-class World:
+class Situation:
     """What the robot knows of its surroundings when it decides.
 
     Attributes:
@@ -125,15 +125,15 @@ class World:
     memory: PolicyMemory = field(default_factory=PolicyMemory)
     fleet: FleetOutlook | None = None
 
-    def unvisited(self, place: str) -> float:
+    def idleness_of(self, place: str) -> float:
         """Return the seconds since ``place`` was visited."""
         return self.now - self.visited_at.get(place, self.since)
 
-    def wait_in_words(self, place: str) -> str:
+    def idleness_in_words(self, place: str) -> str:
         """Return how long ago ``place`` was visited."""
         if place not in self.visited_at:
             return 'not visited yet'
-        return f'last visit {self.unvisited(place):.1f} s ago'
+        return f'last visit {self.idleness_of(place):.1f} s ago'
 
     def threshold_of(self, place: str) -> float:
         """Return the seconds after which a place is URGENT; inf: never by waiting.
@@ -162,7 +162,7 @@ class World:
     def is_urgent(self, place: str) -> bool:
         """Return whether a place of the map is URGENT."""
         index = self.graph.index[place]
-        return self.table.time_left(index, self.unvisited(place), self.said_of(place)) < 0.0
+        return self.table.time_left(index, self.idleness_of(place), self.said_of(place)) < 0.0
 
     def is_in(self, place: str, kind: str) -> bool:
         """Return whether a place of the map is of a class, or of all that an entry names."""
@@ -179,7 +179,7 @@ class World:
         due = {}
         for name in places:
             place = index[name]
-            due[place] = table.turns_in(place, self.unvisited(name), self.said_of(name))
+            due[place] = table.turns_in(place, self.idleness_of(name), self.said_of(name))
         found = table.first(due, 0.0, due)
         rule = table.name_of(table.rank_from(found[0], due[found[0]]))
         return rule, tuple(sorted([self.graph.places[place] for place in found]))
@@ -204,7 +204,7 @@ class World:
     @cached_property
     def idleness(self) -> NDArray[np.float64]:
         """Seconds since each place of the graph was visited, shape (n,), in the graph's order."""
-        return np.array([self.unvisited(place) for place in self.graph.places])
+        return np.array([self.idleness_of(place) for place in self.graph.places])
 
 
 @dataclass(frozen=True)

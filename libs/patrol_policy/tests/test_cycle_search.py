@@ -20,18 +20,25 @@ from patrol_policy.battery import (
     Energy,
     Station,
 )
+from patrol_policy.cycle_search import (
+    Breach,
+    Cycle,
+    CycleChanges,
+    CycleSearch,
+    filled,
+    with_charges,
+)
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.rollout import RuleMap
-from patrol_policy.rounds import Breach, Round, RoundChanges, RoundSearch, filled, with_charges
+from patrol_policy.rule_graph import RuleGraph
 
 from .test_plan import grid
-from .worlds import default_ranks, graphs, rule_map_of
+from .worlds import default_ranks, graphs, rule_graph_of
 
 
 @st.composite
 def rule_maps(
     draw: st.DrawFn, *, charging: bool = False, uneven: bool = False, most: int = 7
-) -> RuleMap:
+) -> RuleGraph:
     """Draw a map with rules, with stations that suffice or not, with thresholds that differ."""
     graph = draw(graphs(most=most))
     count = len(graph.places)
@@ -55,15 +62,15 @@ def rule_maps(
             BatteryLimits(0.0, 90.0, 5.0),
         )
     urgent = draw(st.sampled_from([0, 0, 2, 9]))
-    return rule_map_of(graph, threshold, ranks, urgent, own, energy)
+    return rule_graph_of(graph, threshold, ranks, urgent, own, energy)
 
 
-def search_of(rules: RuleMap, targets: tuple[int, ...]) -> RoundSearch:
-    return RoundSearch(rules, [[targets]], rules.graph.tour.length)
+def search_of(rules: RuleGraph, targets: tuple[int, ...]) -> CycleSearch:
+    return CycleSearch(rules, [[targets]], rules.graph.tour.length)
 
 
 def judged_by_walking(
-    rules: RuleMap, targets: tuple[int, ...], resting: set[int]
+    rules: RuleGraph, targets: tuple[int, ...], resting: set[int]
 ) -> tuple[float, float, list[tuple[int, int]], float]:
     """Walk a round again and again and return what the third lap comes to."""
     energy, count = rules.energy, rules.count
@@ -117,7 +124,7 @@ def judged_by_walking(
     return now - begun, longest, breaches, short / energy.draw if energy else 0.0
 
 
-def check_judged(rules: RuleMap, targets: tuple[int, ...]) -> None:
+def check_judged(rules: RuleGraph, targets: tuple[int, ...]) -> None:
     search = search_of(rules, targets)
     found = search.judged(targets)
     lap = rules.graph.tour.length
@@ -129,7 +136,7 @@ def check_judged(rules: RuleMap, targets: tuple[int, ...]) -> None:
     assert [(each.position, each.instead) for each in found.breaches] == breaches
 
 
-def some_round(rules: RuleMap, seed: int, more: int, charges: int) -> tuple[int, ...]:
+def some_round(rules: RuleGraph, seed: int, more: int, charges: int) -> tuple[int, ...]:
     """Return all wanted places in some order, with some twice, and charges among them."""
     draw = random.Random(seed)
     targets = [*rules.wanted, *draw.choices(rules.wanted, k=more)]
@@ -141,14 +148,14 @@ def some_round(rules: RuleMap, seed: int, more: int, charges: int) -> tuple[int,
 
 @settings(max_examples=60)
 @given(rule_maps(), st.integers(0, 10**6), st.integers(0, 3))
-def test_a_round_is_judged_as_by_walking_it(rules: RuleMap, seed: int, more: int) -> None:
+def test_a_round_is_judged_as_by_walking_it(rules: RuleGraph, seed: int, more: int) -> None:
     check_judged(rules, some_round(rules, seed, more, 0))
 
 
 @settings(max_examples=60)
 @given(rule_maps(uneven=True), st.integers(0, 10**6), st.integers(0, 3))
 def test_a_round_of_places_with_own_thresholds_is_judged_as_by_walking_it(
-    rules: RuleMap, seed: int, more: int
+    rules: RuleGraph, seed: int, more: int
 ) -> None:
     check_judged(rules, some_round(rules, seed, more, 0))
 
@@ -156,7 +163,7 @@ def test_a_round_of_places_with_own_thresholds_is_judged_as_by_walking_it(
 @settings(max_examples=80)
 @given(rule_maps(charging=True), st.integers(0, 10**6), st.integers(0, 2), st.integers(1, 3))
 def test_a_round_with_charges_is_judged_as_by_driving_it(
-    rules: RuleMap, seed: int, more: int, charges: int
+    rules: RuleGraph, seed: int, more: int, charges: int
 ) -> None:
     if rules.wanted:
         check_judged(rules, some_round(rules, seed, more, charges))
@@ -164,21 +171,21 @@ def test_a_round_with_charges_is_judged_as_by_driving_it(
 
 def test_a_round_costs_its_wait_and_more_for_what_is_forbidden_and_for_no_charge() -> None:
     graph = grid(3, 3)
-    rules = rule_map_of(graph, 10.0, default_ranks(graph), 0)
+    rules = rule_graph_of(graph, 10.0, default_ranks(graph), 0)
     search = search_of(rules, graph.tour.order)
-    plain = Round(graph.tour.order, 70.0, 70.0)
+    plain = Cycle(graph.tour.order, 70.0, 70.0)
     leg = rules.mean_leg
     assert search.cost(plain) == 70.0
     breach = search.judged(tuple(range(9))).breaches[0]
-    assert search.cost(Round((), 70.0, 70.0, (breach, breach))) == pytest.approx(70.0 + 8.0 * leg)
-    assert search.cost(Round((), 70.0, 70.0, (), leg)) == pytest.approx(70.0 + 24.0 * leg)
+    assert search.cost(Cycle((), 70.0, 70.0, (breach, breach))) == pytest.approx(70.0 + 8.0 * leg)
+    assert search.cost(Cycle((), 70.0, 70.0, (), leg)) == pytest.approx(70.0 + 24.0 * leg)
     # Nobody can visit a held place sooner than it is due: a shorter round is no better.
-    ends = rule_map_of(graph, 200.0, [*[2] * 4, 1, *[2] * 4], 0)
+    ends = rule_graph_of(graph, 200.0, [*[2] * 4, 1, *[2] * 4], 0)
     assert search_of(ends, graph.tour.order).cost(plain) == ends.least_wait > 200.0
 
 
 def lengths_known_beforehand(
-    rules: RuleMap, found: Round, change: str, seeds: range
+    rules: RuleGraph, found: Cycle, change: str, seeds: range
 ) -> tuple[Counter[str], list[tuple[int, ...]]]:
     """Make the same changes with no limit, one just above and one just below the new length.
 
@@ -188,7 +195,7 @@ def lengths_known_beforehand(
     for seed in seeds:
 
         def changed(limit: float) -> tuple[int, ...] | None:
-            each = RoundChanges(rules, found, random.Random(seed))  # noqa: B023
+            each = CycleChanges(rules, found, random.Random(seed))  # noqa: B023
             targets: tuple[int, ...] | None = getattr(each, change)(limit)
             return targets
 
@@ -220,7 +227,7 @@ def one_way(seed: int, count: int) -> PatrolGraph:
 
 def test_how_long_a_changed_round_will_be_is_known_before_it_is_made() -> None:
     graph = one_way(1, 9)
-    rules = rule_map_of(graph, 100.0, [1] * 9, 0)
+    rules = rule_graph_of(graph, 100.0, [1] * 9, 0)
     found = search_of(rules, tuple(range(9))).judged((0, 4, 2, 3, 1, 5, 8, 7, 6))
     assert not found.breaches
     kinds, made = lengths_known_beforehand(rules, found, 'one', range(300))
@@ -240,7 +247,7 @@ def test_how_long_a_changed_round_will_be_is_known_before_it_is_made() -> None:
 
 def test_a_place_that_the_rules_demand_is_taken_along() -> None:
     graph = one_way(2, 9)
-    rules = rule_map_of(graph, 200.0, [1 + number % 3 for number in range(9)], 0)
+    rules = rule_graph_of(graph, 200.0, [1 + number % 3 for number in range(9)], 0)
     found = search_of(rules, tuple(range(9))).judged(tuple(range(9)))
     assert found.breaches
     _, made = lengths_known_beforehand(rules, found, 'one', range(200))
@@ -262,19 +269,19 @@ def test_a_place_that_the_rules_demand_is_taken_along() -> None:
 
 def test_a_visit_that_is_made_twice_is_left_out_again() -> None:
     graph = one_way(3, 6)
-    rules = rule_map_of(graph, 100.0, [1] * 6, 0)
+    rules = rule_graph_of(graph, 100.0, [1] * 6, 0)
     twice = (0, 1, 2, 0, 3, 4, 2, 5)
     found = search_of(rules, twice).judged(twice)
     fewer = set()
     for seed in range(300):
-        targets = RoundChanges(rules, found, random.Random(seed)).one(math.inf)
+        targets = CycleChanges(rules, found, random.Random(seed)).one(math.inf)
         if targets is not None and len(targets) < len(twice):
             assert set(targets) == set(range(6))
             fewer.add(targets)
     assert fewer == {twice[:k] + twice[k + 1 :] for k in (0, 2, 3, 6)}
 
 
-def with_stations(reach: float) -> RuleMap:
+def with_stations(reach: float) -> RuleGraph:
     graph = one_way(4, 7)
     energy = Energy(
         graph,
@@ -283,7 +290,7 @@ def with_stations(reach: float) -> RuleMap:
         0.0,
         BatteryLimits(0.0, 90.0, 5.0),
     )
-    return rule_map_of(graph, 50.0, [1] * 7, 0, energy=energy)
+    return rule_graph_of(graph, 50.0, [1] * 7, 0, energy=energy)
 
 
 def test_charges_are_added_moved_and_left_out_but_for_the_last() -> None:
@@ -295,7 +302,7 @@ def test_charges_are_added_moved_and_left_out_but_for_the_last() -> None:
         charges = Counter[int]()
         stops = set[int]()
         for seed in range(200):
-            new = RoundChanges(rules, found, random.Random(seed)).charged()
+            new = CycleChanges(rules, found, random.Random(seed)).charged()
             assert new is not None
             assert [t for t in new if t < 7] == places
             charges[len(new) - 7] += 1
@@ -307,13 +314,13 @@ def test_charges_are_added_moved_and_left_out_but_for_the_last() -> None:
         assert stops == {7, 8}
     found = search_of(rules, one).judged(one)
     for seed in range(200):
-        left = RoundChanges(rules, found, random.Random(seed)).one(math.inf)
+        left = CycleChanges(rules, found, random.Random(seed)).one(math.inf)
         assert left is None or 7 in left
     found = search_of(rules, both).judged(both)
     fewer = [
         left
         for seed in range(200)
-        if (left := RoundChanges(rules, found, random.Random(seed)).one(math.inf)) is not None
+        if (left := CycleChanges(rules, found, random.Random(seed)).one(math.inf)) is not None
         and len(left) < len(both)
     ]
     assert {tuple(t for t in left if t >= 7) for left in fewer} >= {(7,), (8,)}
@@ -327,7 +334,7 @@ def test_a_round_is_filled_by_further_laps_until_it_is_long_enough(
     draw = random.Random(seed)
     graph = one_way(seed, max(count, 4))
     count = len(graph.places)
-    rules = rule_map_of(graph, 100.0, [draw.choice((1, 1, 2)) for _ in range(count)], 0)
+    rules = rule_graph_of(graph, 100.0, [draw.choice((1, 1, 2)) for _ in range(count)], 0)
     targets = tuple(draw.sample(range(count), count))
     period = factor * rules.length(targets)
     made = filled(rules, targets, period)
@@ -362,7 +369,7 @@ def test_charges_are_put_only_where_the_charge_would_not_last(
 ) -> None:
     station = Station(graph.places[0], ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits(0.0, 90.0, 5.0))
-    rules = rule_map_of(graph, 50.0, default_ranks(graph), 0, energy=energy)
+    rules = rule_graph_of(graph, 50.0, default_ranks(graph), 0, energy=energy)
     if len(rules.wanted) < 2:
         return
     targets = tuple(random.Random(seed).sample(rules.wanted, len(rules.wanted)))
@@ -395,13 +402,13 @@ def test_the_search_begins_with_the_best_of_each_group_and_is_finished_when_none
     None
 ):
     graph = grid(3, 3)
-    rules = rule_map_of(graph, 500.0, [1] * 9, 0)
+    rules = rule_graph_of(graph, 500.0, [1] * 9, 0)
     tour, worse = graph.tour.order, tuple(range(9))
-    search = RoundSearch(rules, [[worse, tour], [worse]], graph.tour.length)
+    search = CycleSearch(rules, [[worse, tour], [worse]], graph.tour.length)
     assert search.begun == search.best
     assert search.best.length == pytest.approx(rules.length(tour))
     assert search.finished or search.best.length > graph.tour.length
-    search = RoundSearch(rules, [[worse]], graph.tour.length)
+    search = CycleSearch(rules, [[worse]], graph.tour.length)
     assert not search.finished
     search.improve(100_000.0)
     assert search.begun.length == pytest.approx(rules.length(worse))
@@ -411,12 +418,12 @@ def test_the_search_begins_with_the_best_of_each_group_and_is_finished_when_none
     search.improve(1000.0)
     assert search.work == done
     # Without any start it is a round of one place.
-    assert RoundSearch(rules, [], graph.tour.length).best.targets == (0,)
+    assert CycleSearch(rules, [], graph.tour.length).best.targets == (0,)
 
 
 def test_a_round_of_one_place_takes_no_time() -> None:
-    rules = rule_map_of(one_way(1, 5), 50.0, [1] * 5, 0)
-    assert search_of(rules, (0, 1, 2, 3, 4)).judged((3,)) == Round((3,), 0.0, 0.0, (), 0.0)
+    rules = rule_graph_of(one_way(1, 5), 50.0, [1] * 5, 0)
+    assert search_of(rules, (0, 1, 2, 3, 4)).judged((3,)) == Cycle((3,), 0.0, 0.0, (), 0.0)
     charged = with_stations(300.0)
     alone = search_of(charged, (7, 0, 1, 2, 3, 4, 5, 6)).judged((3,))
     assert (alone.length, alone.wait, alone.breaches, alone.short) == (0.0, 0.0, (), 0.0)
@@ -429,7 +436,7 @@ def test_a_round_of_one_place_takes_no_time() -> None:
 @settings(max_examples=30)
 @given(rule_maps(uneven=True), st.integers(0, 10**6), st.floats(0.3, 1.5))
 def test_a_round_is_judged_in_part_only_where_it_costs_more_than_the_limit(
-    rules: RuleMap, seed: int, part: float
+    rules: RuleGraph, seed: int, part: float
 ) -> None:
     targets = some_round(rules, seed, 3, 0)
     search = search_of(rules, targets)
@@ -448,7 +455,7 @@ def test_a_round_is_judged_in_part_only_where_it_costs_more_than_the_limit(
 
 def test_work_is_counted_by_steps_and_tries() -> None:
     graph = one_way(3, 6)
-    rules = rule_map_of(graph, 100.0, [1] * 6, 0)
+    rules = rule_graph_of(graph, 100.0, [1] * 6, 0)
     search = search_of(rules, (0, 3, 1, 4, 2, 5))
     steps = sum(len(rules.path(a, b)) for a, b in itertools.pairwise((5, 0, 3, 1, 4, 2, 5)))
     assert search.work == pytest.approx(0.35 * steps)
@@ -462,7 +469,7 @@ def test_work_is_counted_by_steps_and_tries() -> None:
 
 def test_a_search_ends_where_nothing_can_be_better() -> None:
     graph = one_way(3, 6)
-    even = rule_map_of(graph, 100.0, [1] * 6, 0)
+    even = rule_graph_of(graph, 100.0, [1] * 6, 0)
     tour = graph.tour
     search = search_of(even, tour.order)
     assert search.finished, 'the shortest tour'
