@@ -25,9 +25,6 @@ DOUBLE_NAMES: dict[str, str] = {
     'Kind': 'of an argument of a directive; of an observation',
     'Progress': '',
     'Reasoner': '',
-    'State': '',
-    'Station': '',
-    '_Known': '',
     '_Waiting': '',
 }
 """Class names that several modules use, each with its reason to stay; empty: to be renamed."""

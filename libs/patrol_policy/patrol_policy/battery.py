@@ -141,7 +141,7 @@ class ChargeCurve:
 
 
 @dataclass(frozen=True)
-class Station:
+class Charger:
     """Where the robot can charge.
 
     Attributes:
@@ -182,7 +182,7 @@ class Energy:
     def __init__(
         self,
         graph: PatrolGraph,
-        stations: Sequence[Station],
+        stations: Sequence[Charger],
         draw: Draw,
         time_spread: float,
         limits: BatteryLimits,

@@ -22,8 +22,8 @@ from patrol_policy.battery import (
     Battery,
     BatteryLimits,
     ChargeCurve,
+    Charger,
     Energy,
-    Station,
 )
 from patrol_policy.fleet.assignment import FleetOutlook, Share
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
@@ -164,7 +164,7 @@ def energy_of(world: Situation, battery: Battery, settings: DecisionSettings) ->
     if battery.level is None or battery.draw.rate <= 0.0:
         return None
     stations = [
-        Station(place, battery.curves.get(place, ChargeCurve()), battery.approaches.get(place, 0.0))
+        Charger(place, battery.curves.get(place, ChargeCurve()), battery.approaches.get(place, 0.0))
         for place in sorted(settings.recharge_rooms)
         if place in world.graph.index and place not in world.avoided
     ]

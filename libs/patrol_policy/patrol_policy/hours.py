@@ -218,7 +218,7 @@ class Calendar:
     quiet: WeeklyHours | None = None
     keep_out: frozenset[str] = frozenset()
     zone: tzinfo | None = None
-    _known: dict[WeeklyHours, _Known] = field(
+    _known: dict[WeeklyHours, _WorkedOut] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
 
@@ -272,7 +272,7 @@ class Calendar:
             self.zone,
         )
 
-    def _known_of(self, hours: WeeklyHours, now: float) -> _Known:
+    def _known_of(self, hours: WeeklyHours, now: float) -> _WorkedOut:
         """Return what is worked out of some hours; anew once a day, and when the clock is set."""
         known = self._known.get(hours)
         if known is None or not known.begin + KNOWN_BACK <= now < known.begin + 2.0 * KNOWN_BACK:
@@ -286,12 +286,12 @@ class Calendar:
                 all_quiet = self.quiet.schedule(begin, end, self.zone)
                 quiet = [(b, e) for b, e, kind in all_quiet if kind == MUST]
             windows = tuple(_without(free, quiet))
-            known = self._known[hours] = _Known(begin, stretches, free, windows)
+            known = self._known[hours] = _WorkedOut(begin, stretches, free, windows)
         return known
 
 
 @dataclass(frozen=True)
-class _Known:
+class _WorkedOut:
     """What some hours come to in a stretch of time, seconds since 1970.
 
     Attributes:

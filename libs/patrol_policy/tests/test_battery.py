@@ -12,9 +12,9 @@ from patrol_policy.battery import (
     Battery,
     BatteryLimits,
     ChargeCurve,
+    Charger,
     Draw,
     Energy,
-    Station,
     way_home,
 )
 from patrol_policy.decision import RECHARGE
@@ -30,7 +30,7 @@ from .worlds import default_ranks, rule_graph_of, seven_rooms
 
 def test_what_must_be_left_is_what_driving_home_takes() -> None:
     graph = seven_rooms(300.0)
-    energy = Energy(graph, [Station('E')], Draw(1.0), 0.0, BatteryLimits(0, 90, 5))
+    energy = Energy(graph, [Charger('E')], Draw(1.0), 0.0, BatteryLimits(0, 90, 5))
     home = graph.leg_seconds['R4']['C2'] + graph.leg_seconds['C2']['E']
     # Nothing is explored on the way home.
     assert energy.least[graph.index['R4']] == pytest.approx(home + 5.0)
@@ -40,9 +40,9 @@ def test_what_must_be_left_is_what_driving_home_takes() -> None:
 
 def test_a_station_far_from_its_places_point_costs_the_way_there_and_back() -> None:
     graph, limits, draw = seven_rooms(), BatteryLimits(0, 90, 5), Draw(1.0)
-    near = Energy(graph, [Station('E')], draw, 0.0, limits)
+    near = Energy(graph, [Charger('E')], draw, 0.0, limits)
     far = Energy(
-        graph, [Station('E', approach=20.0), Station('C2', approach=500.0)], draw, 0, limits
+        graph, [Charger('E', approach=20.0), Charger('C2', approach=500.0)], draw, 0, limits
     )
     at = graph.index['R4']
     assert far.home_seconds[at] == pytest.approx(near.home_seconds[at] + 20.0)
@@ -53,7 +53,7 @@ def test_a_station_far_from_its_places_point_costs_the_way_there_and_back() -> N
 
 def test_the_level_of_the_seeds_stays_the_floor() -> None:
     graph = seven_rooms()
-    energy = Energy(graph, [Station('E')], Draw(0.1), 0.0, BatteryLimits(20, 90, 5))
+    energy = Energy(graph, [Charger('E')], Draw(0.1), 0.0, BatteryLimits(20, 90, 5))
     assert set(energy.least) == {20.0}
 
 
@@ -68,17 +68,17 @@ def test_the_fastest_part_of_a_charge_ends_where_the_charge_does() -> None:
     graph = seven_rooms()
     # In parts of 5 %: what is faster above the full level is not used.
     curve = ChargeCurve((1.0,) * 17 + (4.0,) + (9.0,) * 2)
-    energy = Energy(graph, [Station('E', curve)], Draw(0.1), 0.0, BatteryLimits(0, 90, 5))
+    energy = Energy(graph, [Charger('E', curve)], Draw(0.1), 0.0, BatteryLimits(0, 90, 5))
     assert energy.fastest == pytest.approx(4.0)
     slow = ChargeCurve((1.0,) * 18 + (9.0,) * 2)
-    energy = Energy(graph, [Station('E', slow)], Draw(0.1), 0.0, BatteryLimits(0, 90, 5))
+    energy = Energy(graph, [Charger('E', slow)], Draw(0.1), 0.0, BatteryLimits(0, 90, 5))
     assert energy.fastest == pytest.approx(1.0)
 
 
 def test_a_charge_from_any_level_takes_what_the_curve_says() -> None:
     curve = ChargeCurve((1.0,) * 16 + (0.25,) * 4)
     graph, limits = seven_rooms(), BatteryLimits(10, 87, 5)
-    energy = Energy(graph, [Station('R1'), Station('E', curve)], Draw(0.1), 0.0, limits)
+    energy = Energy(graph, [Charger('R1'), Charger('E', curve)], Draw(0.1), 0.0, limits)
     for level in (0.0, 0.5, 30.25, 79.5, 80.0, 86.5, 87.0, 95.0):
         assert energy.charge_seconds(1, level) == pytest.approx(curve.seconds(level, 87.0))
     assert energy.charge_seconds(1, -4.0) > energy.charge_seconds(1, 0.0)
@@ -91,7 +91,7 @@ def test_a_charge_from_any_level_takes_what_the_curve_says() -> None:
 
 def test_the_time_at_a_dock_for_each_second_away_counts_the_way_to_it() -> None:
     graph, limits = seven_rooms(), BatteryLimits(20, 90, 5)
-    station = Station('E', ChargeCurve((2.0,) * 16 + (0.5,) * 4), 6.0)
+    station = Charger('E', ChargeCurve((2.0,) * 16 + (0.5,) * 4), 6.0)
     energy = Energy(graph, [station], Draw(0.5), 0.0, limits)
     # 10 % are made good with 0.5 %/s.
     assert energy.charge_ratio(20.0) == pytest.approx((20.0 + 12.0) / 20.0)
@@ -100,7 +100,7 @@ def test_the_time_at_a_dock_for_each_second_away_counts_the_way_to_it() -> None:
     assert energy.charge_ratio(500.0) == pytest.approx((20.0 + 30.0 + 12.0) / 140.0)
     assert energy.charge_ratio(0.5) == pytest.approx((0.5 + 12.0) / 0.5)
     assert energy.charge_ratio(0.0) == 0.0
-    unknown = Energy(graph, [Station('E', station.curve, math.inf)], Draw(0.5), 0.0, limits)
+    unknown = Energy(graph, [Charger('E', station.curve, math.inf)], Draw(0.5), 0.0, limits)
     assert unknown.charge_ratio(20.0) == 0.0
 
 
@@ -127,7 +127,7 @@ def test_a_plan_serves_until_the_battery_differs_by_a_tenth() -> None:
     graph = seven_rooms()
 
     def energy(rate: float = 0.1, charge: float = 1.0, *places: str, stop: float = 90.0) -> Energy:
-        stations = [Station(place, ChargeCurve.even(charge)) for place in places or ('E',)]
+        stations = [Charger(place, ChargeCurve.even(charge)) for place in places or ('E',)]
         return Energy(graph, stations, Draw(rate), 0.0, BatteryLimits(20, stop, 5))
 
     known = energy()
@@ -141,7 +141,7 @@ def test_a_plan_serves_until_the_battery_differs_by_a_tenth() -> None:
     assert not known.alike(energy(0.1, 1.0, 'R1'))
     assert not known.alike(energy(stop=80.0))
     both = energy(0.1, 1.0, 'E', 'R1')
-    stations = [Station('E', ChargeCurve.even(1.0)), Station('R1', ChargeCurve.even(0.5))]
+    stations = [Charger('E', ChargeCurve.even(1.0)), Charger('R1', ChargeCurve.even(0.5))]
     assert not both.alike(Energy(graph, stations, Draw(0.1), 0.0, BatteryLimits(20, 90, 5)))
 
 
@@ -157,13 +157,13 @@ def test_a_robot_may_leave_the_station_when_it_is_charged_and_no_warning_is_up()
 def test_a_place_is_within_range_while_a_full_charge_leaves_what_it_must() -> None:
     graph = seven_rooms()
     for rate in (0.5, 1.0, 2.0, 3.0):
-        energy = Energy(graph, [Station('E')], Draw(rate), 0.1, BatteryLimits(10, 90, 5))
+        energy = Energy(graph, [Charger('E')], Draw(rate), 0.1, BatteryLimits(10, 90, 5))
         for place, at in graph.index.items():
             out, home = energy.out_seconds[at], energy.home_seconds[at]
             assert energy.within_range[at] == energy.suffices(out, home)
             assert energy.least[at] == max(10.0, Draw(rate).most(home, 0.1) + 5.0)
             assert home == way_home(graph, place, ['E', 'NOWHERE'])
-    only = Energy(PatrolGraph({'A': {}, 'B': {}}), [Station('A')], Draw(0.1), 0.0, BatteryLimits())
+    only = Energy(PatrolGraph({'A': {}, 'B': {}}), [Charger('A')], Draw(0.1), 0.0, BatteryLimits())
     assert (only.home, only.within_range) == ([0, -1], [True, False])
     assert math.isinf(only.least[1])
     assert math.isinf(way_home(PatrolGraph({'A': {}, 'B': {}}), 'A', ['B']))
@@ -284,7 +284,7 @@ def test_the_bound_is_that_of_trying_all_walks(
     legs: dict[str, dict[str, float]], ranks: list[int], reach: float, factor: float
 ) -> None:
     graph = PatrolGraph(legs, 6.0)
-    station = Station('A', ChargeCurve.even(2.0))
+    station = Charger('A', ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits())
     rules = rule_graph_of(graph, factor * graph.tour.length, ranks, 0, energy=energy)
     bound = charge_bound(rules)
@@ -296,7 +296,7 @@ def test_the_bound_is_that_of_trying_all_walks(
 def test_a_station_in_a_dead_end_is_entered_by_a_charge_before_it_is_urgent() -> None:
     legs = {'A': {'B': 8.0}, 'B': {'A': 8.0, 'C': 7.0}, 'C': {'B': 7.0, 'D': 9.0}, 'D': {'C': 9.0}}
     graph = PatrolGraph(legs, 6.0)
-    station = Station('A', ChargeCurve.even(4.0))
+    station = Charger('A', ChargeCurve.even(4.0))
     energy = Energy(graph, [station], Draw(0.2), 0.0, BatteryLimits())
     rules = rule_graph_of(graph, 5.0 * graph.tour.length, default_ranks(graph), 0, energy=energy)
     # D waits for its threshold, A does not: the robot charges there.

@@ -16,9 +16,9 @@ from patrol_policy.battery import (
     WORTH_CHARGING,
     BatteryLimits,
     ChargeCurve,
+    Charger,
     Draw,
     Energy,
-    Station,
 )
 from patrol_policy.cycle_search import (
     Breach,
@@ -56,7 +56,7 @@ def rule_maps(
         stations = draw(st.sets(st.sampled_from(graph.places), min_size=1, max_size=2))
         energy = Energy(
             graph,
-            [Station(place, ChargeCurve.even(3.0), 1.5) for place in sorted(stations)],
+            [Charger(place, ChargeCurve.even(3.0), 1.5) for place in sorted(stations)],
             Draw(draw(st.floats(5.0, 90.0)) / graph.tour.length),
             0.0,
             BatteryLimits(0.0, 90.0, 5.0),
@@ -285,7 +285,7 @@ def with_stations(reach: float) -> RuleGraph:
     graph = one_way(4, 7)
     energy = Energy(
         graph,
-        [Station('P1', ChargeCurve.even(2.0)), Station('P5', ChargeCurve.even(1.0))],
+        [Charger('P1', ChargeCurve.even(2.0)), Charger('P5', ChargeCurve.even(1.0))],
         Draw(90.0 / reach),
         0.0,
         BatteryLimits(0.0, 90.0, 5.0),
@@ -367,7 +367,7 @@ def test_a_round_is_filled_by_further_laps_until_it_is_long_enough(
 def test_charges_are_put_only_where_the_charge_would_not_last(
     graph: PatrolGraph, reach: float, seed: int
 ) -> None:
-    station = Station(graph.places[0], ChargeCurve.even(2.0))
+    station = Charger(graph.places[0], ChargeCurve.even(2.0))
     energy = Energy(graph, [station], Draw(100.0 / reach), 0.0, BatteryLimits(0.0, 90.0, 5.0))
     rules = rule_graph_of(graph, 50.0, default_ranks(graph), 0, energy=energy)
     if len(rules.wanted) < 2:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from patrol_policy.battery import BatteryLimits, ChargeCurve, Draw, Energy, Station
+from patrol_policy.battery import BatteryLimits, ChargeCurve, Charger, Draw, Energy
 from patrol_policy.decision import DecisionSettings
 from patrol_policy.fleet import (
     FleetChoice,
@@ -29,7 +29,7 @@ from patrol_policy.rule_table import Priorities
 from patrol_policy.situation import Situation
 from patrol_policy.tour import tour_length
 
-from .test_fleet import random_map, ring
+from .test_assignment import random_map, ring
 from .test_plan import chain
 
 ROW = chain(4)
@@ -303,7 +303,7 @@ def test_what_is_rehearsed_is_what_comes() -> None:
     assert max(found[place] for place in found if place[0] == 'P') <= 100.0
     # With a battery that lasts long the same, with a weak one longer.
     energy = Energy(
-        world.graph, [Station('P00', ChargeCurve.even(1.0))], Draw(0.05), 0.0, BatteryLimits()
+        world.graph, [Charger('P00', ChargeCurve.even(1.0))], Draw(0.05), 0.0, BatteryLimits()
     )
     assert fleet_waits(world, settings, energy) == found, 'there is no dock'
     docked = FleetSettings(docks=('P00', 'X'), charge_ratio=0.5)
@@ -314,6 +314,6 @@ def test_what_is_rehearsed_is_what_comes() -> None:
         }
     )
     weak = Energy(
-        world.graph, [Station('P00', ChargeCurve.even(1.0))], Draw(0.25), 0.0, BatteryLimits()
+        world.graph, [Charger('P00', ChargeCurve.even(1.0))], Draw(0.25), 0.0, BatteryLimits()
     )
     assert max(fleet_waits(charged, settings, weak).values()) > max(found.values())

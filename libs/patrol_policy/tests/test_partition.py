@@ -38,7 +38,7 @@ from patrol_policy.fleet.partition import (
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.tour import shortest_tour, tour_length
 
-from .test_fleet import fleet, random_map, ring
+from .test_assignment import fleet, random_map, ring
 
 
 def cuts(order: list[int]) -> Iterator[list[list[int]]]:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from patrol_policy import plan as plan_module
-from patrol_policy.battery import WORTH_CHARGING, BatteryLimits, ChargeCurve, Draw, Energy, Station
+from patrol_policy.battery import WORTH_CHARGING, BatteryLimits, ChargeCurve, Charger, Draw, Energy
 from patrol_policy.cycle_search import Cycle
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import Openings
@@ -124,7 +124,7 @@ def test_a_target_with_hours_is_gone_to_while_it_is_open_and_can_be_left_again(
 
 def charged(reach: float = 300.0) -> RuleGraph:
     energy = Energy(
-        CHAIN, [Station('P0', ChargeCurve.even(2.0))], Draw(90.0 / reach), 0.0,
+        CHAIN, [Charger('P0', ChargeCurve.even(2.0))], Draw(90.0 / reach), 0.0,
         BatteryLimits(0.0, 90.0, 5.0),
     )  # fmt: skip
     return rule_graph_of(CHAIN, 50.0, [1] * 4, 9, energy=energy)
@@ -296,7 +296,7 @@ def test_a_plan_keeps_while_the_battery_differs_little() -> None:
     world = known(CHAIN, level=80.0)
 
     def energy(rate: float) -> Energy:
-        station = Station('P0', ChargeCurve.even(2.0))
+        station = Charger('P0', ChargeCurve.even(2.0))
         return Energy(CHAIN, [station], Draw(rate), 0.0, BatteryLimits(0.0, 90.0, 5.0))
 
     plan = planned(world, energy=energy(0.3))

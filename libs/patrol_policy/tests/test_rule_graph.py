@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patrol_policy.battery import BatteryLimits, ChargeCurve, Draw, Energy, Station
+from patrol_policy.battery import BatteryLimits, ChargeCurve, Charger, Draw, Energy
 from patrol_policy.decision import NowhereToGoError, candidates
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import Openings
@@ -118,13 +118,13 @@ def test_ways_on_a_large_map_are_those_of_a_small_one(
 ) -> None:
     graph = hall(5, 4, seed)
     small = rule_graph_of(graph, 100.0, default_ranks(graph), 0)
-    energy = Energy(graph, [Station('P0000')], Draw(0.1), 0.0, BatteryLimits())
+    energy = Energy(graph, [Charger('P0000')], Draw(0.1), 0.0, BatteryLimits())
     charged = rule_graph_of(graph, 100.0, default_ranks(graph), 0, energy=energy)
     for reach in (200, 3):
         monkeypatch.setattr('patrol_policy.graph.ALL_PAIRS_UP_TO', 5)
         monkeypatch.setattr('patrol_policy.rule_graph.LOCAL_REACH', reach)
         other = PatrolGraph(graph.leg_seconds, graph.exploration_seconds)
-        energy = Energy(other, [Station('P0000')], Draw(0.1), 0.0, BatteryLimits())
+        energy = Energy(other, [Charger('P0000')], Draw(0.1), 0.0, BatteryLimits())
         large = rule_graph_of(other, 100.0, default_ranks(other), 0, energy=energy)
         for stop, target in itertools.product(range(21), repeat=2):
             assert large.away[stop][target] == pytest.approx(charged.away[stop][target])
@@ -273,7 +273,7 @@ def charged(reach: float = 200.0, stations: tuple[str, ...] = ('E',)) -> RuleGra
     graph = seven_rooms()
     energy = Energy(
         graph,
-        [Station(place, ChargeCurve.even(2.0), 3.0) for place in stations],
+        [Charger(place, ChargeCurve.even(2.0), 3.0) for place in stations],
         Draw(90.0 / reach),
         0.0,
         BatteryLimits(0.0, 90.0, 5.0),
@@ -343,7 +343,7 @@ def test_slack_is_how_much_later_than_others_a_place_may_be_visited() -> None:
     never = rule_graph_of(graph, math.inf, default_ranks(graph), 0)
     assert (never.is_even, never.slack) == (False, [0.0] * 4)
     # Out of reach of the charge.
-    far = Energy(graph, [Station('P0')], Draw(2.5), 0.0, BatteryLimits(0.0, 90.0, 5.0))
+    far = Energy(graph, [Charger('P0')], Draw(2.5), 0.0, BatteryLimits(0.0, 90.0, 5.0))
     reached = rule_graph_of(graph, 50.0, default_ranks(graph), 0, energy=far)
     assert reached.wanted == [0, 1, 2]
     assert reached.slack == [0.0, 0.0, 0.0, math.inf, 0.0]

@@ -2,7 +2,7 @@
 
 Whoever compares two logs, or replays one, relies on it. The missions were recorded on 27 November
 2026. A change of the search that is meant may give others: then the waits below may not get longer,
-and `python -m tests.test_recorded_missions` in this library's folder prints the new ones.
+and `python -m tests.test_simulation` in this library's folder prints the new ones.
 """
 
 from __future__ import annotations
