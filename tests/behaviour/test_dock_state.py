@@ -8,7 +8,7 @@ from surveillance_behaviour.mission.dock_state import DockState
 
 pytestmark = pytest.mark.unit
 
-ROOM, STATION, NEAR = (1.0, 1.0), (3.0, 1.0), (1.1, 1.0)
+ROOM, STATION, NEAR = (1.0, 1.0, 0.0), (3.0, 1.0, 0.0), (1.1, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ ROOM, STATION, NEAR = (1.0, 1.0), (3.0, 1.0), (1.1, 1.0)
 )
 def test_where_a_drive_ends_says_whether_it_docks(
     to_station: bool,
-    station: tuple[float, float] | None,
+    station: tuple[float, float, float] | None,
     is_recharge_room: bool,
     ends_there: bool,
     docks: bool,

@@ -42,7 +42,8 @@ def test_one_robot_has_one_part_without_a_namespace():
 
 def test_a_fleet_shares_ontology_map_and_simulator():
     shared, first, second = team(Run(robots=2, namespace='house', record='runs', web=True))
-    assert {'armor_server', 'ontology_map_builder', 'simulator', 'mission_page'} == names(shared)
+    nodes = {'armor_server', 'ontology_map_builder', 'simulator', 'alarm'}
+    assert nodes | {'mission_page'} == names(shared)
     assert shared.run.namespace == 'house'
     assert (first.run.namespace, second.run.namespace) == ('house/robot1', 'house/robot2')
     assert names(first) == names(second)
@@ -136,7 +137,7 @@ def test_a_wrong_robot_costs_one_line(tmp_path, robots, problem):
 def test_only_and_without_name_robots_and_their_nodes():
     assert [part.robot for part in team(Run(robots=2, only=('robot2',)))] == ['robot2']
     (shared,) = team(Run(robots=2, only=('shared',)))
-    assert names(shared) == {'armor_server', 'ontology_map_builder', 'simulator'}
+    assert names(shared) == {'armor_server', 'ontology_map_builder', 'simulator', 'alarm'}
     (one,) = team(Run(robots=2, only=('robot1/planner_controller',)))
     assert names(one) == {'planner_controller'}
     left = team(Run(robots=2, without=('robot1', 'armor_server')))

@@ -351,6 +351,6 @@ class Mission:
         """Announce something."""
         self.ports.announcer.say(text, warning=warning)
 
-    def note(self, event: str, /, **fields: object) -> None:
+    def note(self, event: str, **fields: object) -> None:
         """Write an entry of the log once the mission has begun."""
         self.notes.write(event, **fields)
