@@ -214,7 +214,7 @@ class MissionSubscriber:
             return state.having(others={**state.place.others, **others}) if others else state
 
         # Observers go on reporting after a mission's end.
-        self.update(changed, begins=any(topic.name[0] != '/' for topic, _ in came))
+        self.update(changed, begins=any(topic.is_of_mission for topic, _ in came))
 
     def _look(self) -> None:
         """Look at the graph, and ask for what is missing."""

@@ -14,7 +14,6 @@ from surveillance_operator.mission_state import STALE, HealthView, NodeReport
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.topics import Topic
 from surveillance_runtime.diagnostics import STALE_AFTER
-from surveillance_runtime.fleet_messages import FLEET_TOPIC
 from surveillance_runtime.node import PatrolNode
 
 LOOK_PERIOD = 0.5
@@ -82,8 +81,9 @@ class NodeGraphWatch:
         names, silent = set(servers()), dict(health.silent)
         for topic, subscription in topics:
             for info in self._node.get_publishers_info_by_topic(subscription.topic):
-                is_of_all = topic.name.startswith('/') or topic.name == FLEET_TOPIC
-                if not is_of_all and not info.node_name.startswith('_'):
+                # On a topic of a whole fleet, other robots' nodes speak.
+                is_own = topic.is_of_mission and topic.whose is None
+                if is_own and not info.node_name.startswith('_'):
                     names.add(info.node_name)
                 fits, reason = qos_check_compatible(info.qos_profile, subscription.qos)
                 if fits == QoSCompatibility.ERROR:

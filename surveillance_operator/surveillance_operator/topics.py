@@ -123,6 +123,14 @@ class Topic(NamedTuple):
     period: float = 0.0
     whose: Callable[[Any], frozenset[str] | None] | None = None
 
+    @property
+    def is_of_mission(self) -> bool:
+        """Whether that somebody speaks on it means that a mission runs.
+
+        On the others nodes speak, too, that only look on and stay after a mission's end.
+        """
+        return not self.name.startswith('/') and self.name != INCIDENTS_TOPIC
+
 
 def read_message(state: MissionState, topic: Topic, message: Any) -> MissionState:
     """Return the state with what a message says, or why it cannot be used."""

@@ -105,3 +105,8 @@ def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
     state = read_message(MissionState(), TOPIC['scan_surroundings/_action/feedback'], feedback)
     assert read_message(state, goals, running).sensors.scan_progress == (4, 7)
     assert read_message(state, goals, ended).sensors.scan_progress is None
+
+
+def test_a_topic_on_which_those_speak_who_only_look_on_tells_of_no_mission() -> None:
+    everybody = {name for name, topic in TOPIC.items() if not topic.is_of_mission}
+    assert everybody == {'/diagnostics', '/parameter_events', 'incidents'}
