@@ -24,7 +24,7 @@ from surveillance_behaviour.map_from_markers.assembly import (
     SurveyReport,
     notes_of,
 )
-from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, Progress
+from surveillance_behaviour.map_from_markers.initial_scan import InitialScan, ScanProgress
 from surveillance_behaviour.map_from_markers.scan_peers import CameraScanner, MarkerInquiry
 from surveillance_interfaces.msg import OntologyMap
 from surveillance_interfaces.srv import ReferenceName
@@ -66,7 +66,7 @@ class InitialState(PatrolNode):
             read_only=True,
         )
         self._survey = Survey(self.get_parameter('robot_room').value, (0.0, 0.0))
-        self._progress = Progress()
+        self._progress = ScanProgress()
         self._file = KeptFile.of_record(record, '.survey.json')
         self._missing: list[str] = []
         if problem := self._file.read(self._take_kept):
@@ -125,7 +125,7 @@ class InitialState(PatrolNode):
 
     def _take_kept(self, kept: dict[str, Any]) -> None:
         poses = [int(number) for number in kept['poses']]
-        progress = Progress(poses, float(kept['seconds']))
+        progress = ScanProgress(poses, float(kept['seconds']))
         self._survey.restore(kept)
         self._progress = progress
 

@@ -42,7 +42,7 @@ class ScanCamera(Protocol):
 
 
 @dataclass
-class Progress:
+class ScanProgress:
     """How far a scan has come; it goes on from there after a restart.
 
     Attributes:
@@ -78,7 +78,7 @@ class InitialScan:
         now: Callable[[], float],
         say: Callable[[str], None],
         stopping: Callable[[], bool],
-        progress: Progress | None = None,
+        progress: ScanProgress | None = None,
         keep: Callable[[], None] = lambda: None,
         real: Callable[[], float] = time.monotonic,
     ) -> SurveyReport:
@@ -94,7 +94,7 @@ class InitialScan:
             keep: Called whenever there is progress worth keeping.
             real: Seconds of real time.
         """
-        progress = progress or Progress()
+        progress = progress or ScanProgress()
         begin, real_begin = now() - progress.seconds, real()
         looked_around = False
 
