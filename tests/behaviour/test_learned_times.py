@@ -46,7 +46,7 @@ def test_a_minute_without_a_look_is_no_step() -> None:
 def test_what_was_learned_is_read_back_whole_or_not_at_all(tmp_path: Path) -> None:
     record = str(tmp_path / 'm.jsonl')
     first = LearnedTimes.of_record(record)
-    first.visits = {'A': 12.3456, 'B': -1.0}
+    first.visited_at = {'A': 12.3456, 'B': -1.0}
     first.leg_times.observe('A', 'B', 20.0, 8.0)
     first.draw.restore([0.1])
     first.charge.restore({'E': {'4': [0.1]}})
@@ -54,7 +54,7 @@ def test_what_was_learned_is_read_back_whole_or_not_at_all(tmp_path: Path) -> No
     first.save()
     again = LearnedTimes.of_record(record)
     assert again.problem == ''
-    assert again.visits == {'A': 12.346, 'B': -1.0}
+    assert again.visited_at == {'A': 12.346, 'B': -1.0}
     assert again.leg_times.to_json() == first.leg_times.to_json()
     assert again.draw == first.draw
     assert again.charge.curves() == first.charge.curves()
@@ -73,7 +73,7 @@ def test_what_was_learned_is_read_back_whole_or_not_at_all(tmp_path: Path) -> No
         file.write_text(json.dumps({name: each for name, each in whole.items() if name != key}))
         found = LearnedTimes.of_record(record)
         assert f"expected '{key}' in it" in found.problem
-        assert (found.visits, found.requested, found.sent_to_charge) == ({}, '', '')
+        assert (found.visited_at, found.requested, found.sent_to_charge) == ({}, '', '')
         assert found.draw.to_json() == []
     whole['draw'] = [0.1, 99.0]
     file.write_text(json.dumps(whole))

@@ -141,6 +141,8 @@ class CycleSearch:
         kept = tuple(target for target in targets if target in wanted)
         if not kept:
             return
+        # Which places come once more depends on where the cycle is taken to begin: all, or on a
+        # large map some, are tried.
         turned: Iterable[tuple[int, ...]] = (kept,)
         if rules.length(kept) < self._period:
             every = max(1, len(kept) ** 2 // ROTATIONS)
@@ -166,6 +168,8 @@ class CycleSearch:
             targets: Of the cycle.
             limit: Of the cost; a cycle that costs more may be judged in part only.
         """
+        # In the order of cost: what a limit can tell from the length is known before the rules are
+        # asked for each step.
         walk, ends = self._walked(targets)
         times, short = self._timed(walk)
         wait = length = times[-1] if times else 0.0
@@ -240,6 +244,8 @@ class CycleSearch:
     def _longest_wait(self, walk: list[int], times: list[float], length: float) -> float:
         """Return the longest wait on a periodic walk, less the slack of the place."""
         places, slack = self._rules.places, self._rules.slack
+        # The walk comes round: before its first step each place was visited as it is at its end,
+        # one length earlier. So one pass knows all waits of the endless patrol.
         seen = {places[stop]: then - length for stop, then in zip(walk, times, strict=True)}
         longest = 0.0
         for stop, then in zip(walk, times, strict=True):
@@ -265,6 +271,8 @@ class CycleSearch:
     @property
     def finished(self) -> bool:
         """Whether a better cycle is not looked for: none can be, or very much was tried."""
+        # Below `least_round` no lawful cycle is known to fall; a little above it, further work
+        # would gain less than drives differ from what is expected of them.
         best = self.best
         if self.work > ALL_WORK or len(best.targets) < 4:
             return True
@@ -290,6 +298,8 @@ class CycleSearch:
             # A rise of six times the heat is taken once in 400 tries: what costs more is not judged
             # to its end.
             limit = self._cost + 6.0 * heat
+            # Three kinds of changes: more visits (where thresholds differ, or a cycle has to be
+            # filled), charges, and the order of the targets.
             changes = self._changes
             chance = self._draw.random()
             if chance < self._filling:
@@ -303,6 +313,8 @@ class CycleSearch:
             found = self.judged(targets, limit)
             cost = self.cost(found)
             rise = cost - self._cost
+            # Metropolis' rule: what is worse is taken with the chance exp(-rise / heat), so that
+            # the search leaves a valley, and seldom does once it is cold.
             if rise <= 0.0 or (heat > 0.0 and self._draw.random() < math.exp(-rise / heat)):
                 self._take(found)
                 if cost < self.cost(self.best) - 1e-9:
@@ -328,7 +340,8 @@ class CycleChanges:
         self._targets = targets = found.targets
         self._breaches = found.breaches
         self._at = {target: position for position, target in enumerate(targets)}
-        # Lengths of the legs up to each position, there and back.
+        # Lengths of the legs up to each position, there and back: with them the length of a stretch
+        # that is turned round is known without walking it, though legs differ by direction.
         away = rules.away
         there, back = [0.0], [0.0]
         for before, after in itertools.pairwise(targets):
@@ -345,6 +358,7 @@ class CycleChanges:
         if not self._has_limit:
             limit = math.inf
         choice = draw.random()
+        # A step that is forbidden says itself what is lacking: repairs are tried before chance.
         if breaches and choice < 0.3:
             return self._taken_along(breaches[draw.randrange(len(breaches))], limit)
         if choice < 0.35:
@@ -352,6 +366,8 @@ class CycleChanges:
         count = len(self._targets)
         if count < 4:
             return None
+        # Only changes that bring near places beside one another are tried: nearly all that shorten
+        # a tour do (neighbour lists, Johnson and McGeoch, "The traveling salesman problem", 1997).
         first = draw.randrange(count)
         near = self._rules.near(self._targets[first])
         if not near:
@@ -423,6 +439,8 @@ class CycleChanges:
 
     def _turned_round(self, first: int, last: int, limit: float) -> tuple[int, ...] | None:
         """Turn a stretch round so that its ends come beside each other's neighbours."""
+        # 2-opt (Croes, "A method for solving traveling-salesman problems", 1958): two legs are
+        # taken out, and the stretch between them is walked the other way.
         targets, away = self._targets, self._rules.away
         count = len(targets)
         if self._draw.random() < 0.5:
@@ -442,6 +460,8 @@ class CycleChanges:
 
     def _moved(self, first: int, beside: int, limit: float) -> tuple[int, ...] | None:
         """Move a short stretch beside a place that is near it."""
+        # Or-opt (Or, 1976): one to three places or so are put elsewhere, turned round or not. Long
+        # stretches seldom fit between two others, so they are drawn seldom.
         draw, targets, away = self._draw, self._targets, self._rules.away
         count = len(targets)
         size = 1 + min(int(draw.expovariate(0.5)), count - 3)
@@ -500,6 +520,7 @@ def with_charges(rules: RuleGraph, targets: Sequence[int]) -> tuple[int, ...]:
     """
     energy = rules.energy
     assert energy is not None
+    # From the target that is nearest to a station: the way home from there costs least.
     begin = min(range(len(targets)), key=lambda k: energy.home_seconds[targets[k]])
     ordered = [*targets[begin:], *targets[:begin]]
     found: list[int] = []

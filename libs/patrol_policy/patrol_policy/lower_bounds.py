@@ -92,6 +92,9 @@ def rule_bound(
         precision: The bounds that are looked for differ by this part at most.
         states: How many states may be visited in all.
     """
+    # The limit is raised from below: each step either is proven impossible, which raises the bound,
+    # or finds an endless walk, which is a bound from above. Doubling steps find the place where the
+    # answer changes, halving narrows it.
     low, high = simple_bound(graph, table), math.inf
     covers = covers_of(graph)
     if len(covers.core) > CORE_UP_TO:
@@ -142,6 +145,8 @@ class _Search:
             place, ticks = todo.pop()
             if state[2][place] + ticks > longest:
                 continue
+            # Ages are whole ticks, so states are finite in number: an endless walk within the limit
+            # must come back to one, and a search that meets none has seen all.
             following = _after(state, place, ticks)
             if following in on_path and following[1] == everywhere:
                 return True
@@ -203,6 +208,7 @@ class Covers:
     """
 
     def __init__(self, graph: PatrolGraph) -> None:
+        # Rounded down, and one less: a cover must never be longer than the true way.
         ticks = np.maximum(np.floor(TICKS * graph.distances).astype(np.int32) - 1, 0)
         ways = {name: set(graph.leg_seconds[name]) for name in graph.places}
         removed = []
@@ -233,6 +239,8 @@ class Covers:
         """Return whether the places that are due before any moment can be visited by then."""
         place, _, ages = state
         table, here = self._table[self._rows[place]], set(self._up[place])
+        # The oldest first: for each age, all places that are at least as old are due by then, and
+        # no robot visits them faster than their cover says.
         due, hanging, saved = 0, sum(self._back[leg] for leg in here), 0
         driven: set[int] = set()
         for age, other in sorted(zip(ages, range(len(ages)), strict=True), reverse=True):
@@ -262,6 +270,8 @@ def _shortest_covers(ticks: NDArray[np.int32]) -> NDArray[np.int32]:
     Args:
         ticks: From each place to each other, shape (n, n).
     """
+    # Held and Karp, "A dynamic programming approach to sequencing problems", 1962; all sets of one
+    # size at once, since each needs those that are smaller by one place alone.
     count = len(ticks)
     sets = np.arange(1 << count)
     sizes = np.array([(sets >> place) & 1 for place in range(count)]).sum(axis=0)
@@ -294,6 +304,7 @@ def charge_bound(rules: RuleGraph, precision: float = 0.01, states: int = STATES
         return RuleBound(max(rules.least_period, _tree_length(away)))
     cover = _shortest_covers(np.maximum(np.floor(TICKS * away) - 1, 0).astype(np.int32))
     through = min(int(cover[station, -1]) for station in energy.stations) / TICKS
+    # What is drawn must be charged again: in the long run so much of all time goes there, at best.
     charging = energy.draw / (energy.draw + energy.fastest)
     low = max(
         rules.least_period,
@@ -401,6 +412,8 @@ class _ChargeSearch:
         charges = []
         for number, station in enumerate(self._energy.stations):
             drive = math.floor(TICKS * self._energy.drive[number][place])
+            # A charge that gives next to nothing is none: else a robot could charge to drive home
+            # without exploring, which no plan may.
             if used + drive < self._worth:
                 continue
             level = self._energy.full - self._energy.draw * (used + drive) / TICKS

@@ -98,11 +98,14 @@ class Plan:
         hop = rules.hop(state.place, target)
         if hop in allowed:
             return hop
+        # The rules force it elsewhere: to where the detour is shortest, and among equals to the
+        # place that waits longest.
         legs, away = rules.leg_seconds[state.place], rules.away
         return min(allowed, key=lambda o: (legs[o] + away[o][target], state.seen[o], o))
 
     def _target(self, rules: RuleGraph, state: PatrolState) -> int:
         """Move on to the next target that is not to be skipped, and return it."""
+        # At most once round: of targets that are all to be skipped none is due.
         place, times = state.place, state.due or rules.due(state)
         for _ in self.targets:
             target = self.targets[state.position]
@@ -205,6 +208,8 @@ class Planner:
 
         Times and rates that differ a little keep the plan.
         """
+        # All that follows is compared because a plan is only as good as what it rests on; what
+        # differs by less than drives do is not worth the turn that a new plan may bring.
         planned, graph = self.rule_graph.graph, world.graph
         if world.table is not self.rule_graph.table and world.table != self.rule_graph.table:
             return False
@@ -331,6 +336,7 @@ class Planner:
         index = graph.index
         said = {index[place]: world.said_of(place) for place in world.said if place in index}
         due = self.rule_graph.table.due_times(world.now, seen, said)
+        # What is said of a place stays until it is visited: see `RuleTable.due_times`.
         here = graph.index[world.place]
         if here != self.state.place:
             met[here] = True
@@ -364,11 +370,14 @@ class Planner:
         self._plan = plan or self._entered(self._search.best, 0)
         self._outcome = self._followed(self._plan, math.inf)
         self._began = self.state
+        # Each candidate is walked until it repeats itself: only so it is known what the rules make
+        # of a way into the cycle, on which places are as old as they are now.
         end = self._work + work
         for candidate in self._candidates():
             if self._work > end or self._is_finished() or self._late():
                 break
             self._try(candidate)
+        # What closes soon cannot wait for the cycle to come round to it.
         for candidate in self._in_time():
             if self._late():
                 break
@@ -392,6 +401,7 @@ class Planner:
 
         A level above that at which charges end is had once only.
         """
+        # Else the first time round would be longer than all later ones, and never come back.
         state, energy = self.state, self.rule_graph.energy
         if energy is not None and state.level > energy.full:
             state = replace(state, level=energy.full)
@@ -406,6 +416,7 @@ class Planner:
         that it began with.
         """
         search = self._search
+        # The direction counts, too: legs differ by it, and what waits longest may lie behind.
         ways = [
             [self._entered(found, phase) for phase in self._phases(found)]
             for found in dict.fromkeys((search.begun, search.best))

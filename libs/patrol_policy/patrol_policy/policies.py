@@ -68,6 +68,7 @@ def make_policy(name: str) -> Policy:
 
 def by_chance(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
     """Return a random score for each place."""
+    # As the assignment's own solution: what any policy is to be better than.
     generator = world.memory.generator
     return {place: Score(generator.random(), place, 'drawn at random') for place in allowed}
 
@@ -82,6 +83,10 @@ def oldest(world: Situation, allowed: Sequence[str], energy: Energy | None = Non
 
 def lookahead(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores:
     """Return the best of (time unvisited - time to get there), by way of each candidate."""
+    # Greedy over the whole map, not over the candidates alone: a place far off that has waited long
+    # outweighs a near one, less the time that the way to it costs. The cognitive agents of Machado
+    # et al. ("Multi-agent patrolling", 2002) choose by idleness alone and drive there, too; here
+    # only the next place is entered, and the choice is made anew from there.
     graph = world.graph
     scores = {}
     for place in allowed:
@@ -96,6 +101,8 @@ def lookahead(world: Situation, allowed: Sequence[str], energy: Energy | None = 
 
 def tour(world: Situation, allowed: Sequence[str], energy: Energy | None = None) -> Scores | Charge:
     """Return the next place of the plan, then how near each place is to its target; see `plan`."""
+    # The plan already says where to; the other places have scores so that a person can compare:
+    # how much further than the chosen one each is from the target.
     planner, graph = planner_of(world, energy), world.graph
     stop, target_stop = planner.advance(world)
     longest = f'the longest wait on this round is {planner.longest:.1f} s'
