@@ -7,6 +7,8 @@ rooms between the walls and compares; `check_passable` asks whether a robot gets
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +16,40 @@ import numpy.typing as npt
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_grid import UNKNOWN, distance_to, regions
 from floor_plans.rooms import PlaceError
-from floor_plans.shapes import WALL_THICKNESS
+from floor_plans.shapes import WALL_THICKNESS, Point
 
 ROBOT_RADIUS = 0.22
 """Radius of a robot that has to get through the doors, metres, where nobody says another one."""
 _LARGE = 1.0
 """A part of the floor from this size on that no point lies in is no part of a room, m^2."""
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPart:
+    """A part of the floor that is no room.
+
+    Attributes:
+        at: A point in it, x and y in metres.
+        area: Square metres.
+        cells: Its cells, shape of the grid.
+        ways: Names of the walls that close a gap of the map towards a room, with that room.
+        is_outside: Whether it reaches to the edge of the map all around.
+    """
+
+    at: Point
+    area: float
+    cells: npt.NDArray[np.bool_]
+    ways: Mapping[str, str]
+    is_outside: bool
+
+    def reason(self, plan: FloorPlan) -> str:
+        """Return why it is no room, in words."""
+        if self.is_outside:
+            return 'outside of the building'
+        if not self.ways:
+            return 'no door: walls all around'
+        widest = max(plan.walls[name].length for name in self.ways)
+        return f'its way in is closed: a wall of {widest:.2f} m'
 
 
 class RoomMap:
@@ -63,6 +93,55 @@ class RoomMap:
     def numbers(self) -> tuple[npt.NDArray[np.int32], dict[int, str]]:
         """Return the number of each cell's room, and the rooms by their numbers."""
         return self._labels, dict(self._names)
+
+    def left_out(self) -> tuple[FloorPart, ...]:
+        """Return the parts of the floor of a map from 1 m^2 on that are no rooms, largest first."""
+        if self._plan.map is None:
+            return ()
+        import cv2
+
+        free = self.grid.free & ~np.isin(self._labels, list(self._names))
+        count, pieces, stats, _ = cv2.connectedComponentsWithStats(
+            free.astype(np.uint8), connectivity=4
+        )
+        areas = stats[:, cv2.CC_STAT_AREA] * self.grid.resolution**2
+        large = [each for each in range(1, count) if areas[each] >= _LARGE]
+        if not large:
+            return ()
+        ways = self._ways_out(np.asarray(pieces, np.int32))
+        clearance = distance_to(~free, self.grid.resolution)
+        edges = (pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1])
+        found = []
+        for piece in sorted(large, key=lambda each: -areas[each]):
+            cells = pieces == piece
+            row, column = np.unravel_index(np.argmax(np.where(cells, clearance, -1)), cells.shape)
+            found.append(
+                FloorPart(
+                    self.grid.centre_of(int(row), int(column)),
+                    float(areas[piece]),
+                    cells,
+                    ways.get(piece, {}),
+                    all((edge == piece).any() for edge in edges),
+                )
+            )
+        return tuple(found)
+
+    def _ways_out(self, pieces: npt.NDArray[np.int32]) -> dict[int, dict[str, str]]:
+        """Return for each part the walls that have it on one side and a room on the other."""
+        found: dict[int, dict[str, str]] = {}
+        for name, wall in self._plan.walls.items():
+            x, y = ((a + b) / 2 for a, b in zip(wall.start, wall.end, strict=True))
+            dx, dy = ((b - a) / wall.length for a, b in zip(wall.start, wall.end, strict=True))
+            sides: list[tuple[str | None, int]] = []
+            for side in (-1.0, 1.0):
+                points = [(x - side * d * dy, y + side * d * dx) for d in (0.15, 0.3, 0.5)]
+                rooms = [self.room_at(*at) for at in points]
+                parts = [self.grid.at(pieces, *at) or 0 for at in points]
+                sides.append((next(filter(None, rooms), None), next(filter(None, parts), 0)))
+            for (room, _), (_, part) in (sides, sides[::-1]):
+                if room and part:
+                    found.setdefault(part, {})[name] = room
+        return found
 
     def _named(self) -> dict[int, str]:
         names: dict[int, str] = {}

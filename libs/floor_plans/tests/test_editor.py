@@ -5,10 +5,12 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from floor_plans import read_place
 from floor_plans.editor import PlaceEditor
+from floor_plans.imports import ImportRequest, import_place
 from floor_plans.map_rooms import propose
 from floor_plans.occupancy_map import read_map, write_map
 from floor_plans.writing import format_place
@@ -199,3 +201,34 @@ def test_the_part_with_the_station_is_where_the_robot_charges(scanned: PlaceEdit
     assert scanned.now.plan.place.recharge_rooms == (other,)
     scanned.save()
     assert read_place(scanned.path).plan.stations[other].pose[:2] == (8.5, 12.0)
+
+
+def test_a_part_that_was_left_out_becomes_a_room_and_is_left_out_again(tmp_path: Path) -> None:
+    cells = np.full((140, 320), 0, np.int8)  # free up to the edge, as white paper is
+    cells[[20, 119], 20:300] = cells[20:120, 20] = cells[20:120, 299] = 100
+    cells[20:120, 120] = cells[20:120, 220] = 100
+    cells[60:80, 120] = 0  # a door
+    cells[67:73, 220] = 0  # a gap of 0.3 m
+    cells[60:84, 20] = 0  # a way out
+    write_map(tmp_path / 'map.yaml', cells, 0.05, (0.0, 0.0, 0.0))
+    report = import_place(ImportRequest(tmp_path / 'map.yaml', tmp_path / 'place.yaml'))
+    assert report.found.startswith('2 rooms, 2 doors, one of them leads outside')
+    editor = PlaceEditor(tmp_path / 'place.yaml')
+    outside, behind = editor.now.left_out
+    plan = editor.now.plan
+    assert outside.is_outside
+    assert outside.reason(plan) == 'outside of the building'
+    assert behind.reason(plan).startswith('its way in is closed: a wall of 0.')
+    assert room_at(editor, *behind.at) == ''
+    with pytest.raises(ValueError, match='expected more than 0'):
+        editor.apply('take_part', {'x': behind.at[0], 'y': behind.at[1]})
+    with pytest.raises(ValueError, match='lies in R1: expected a part that is no room'):
+        editor.apply('take_part', dict(zip('xy', plan.place.positions['R1'][:2], strict=True)))
+    said = editor.apply('take_part', {'x': outside.at[0], 'y': outside.at[1]})
+    taken = room_at(editor, *outside.at)
+    assert said.startswith(f'{taken} is a room, joined by ')
+    editor.save()
+    assert len(read_place(editor.path).place.rooms) == 3
+    assert [part.is_outside for part in editor.now.left_out] == [False]
+    editor.undo()
+    assert len(editor.now.left_out) == 2

@@ -21,8 +21,7 @@ from surveillance_operator.page.server import Action
 
 _MOST_PIXELS = 1_500_000
 """The picture of a larger map shows several cells as one pixel."""
-_UNKNOWN, _WALL, _FIRST = 0, 1, 3
-_FLOOR = 2
+_UNKNOWN, _WALL, _FLOOR, _LEFT_OUT, _OUTSIDE, _FIRST = range(6)
 _COLOURS = (
     *('#fbe3d4', '#d9ecd2', '#d6e6f7', '#f6efc4', '#e7dcf3', '#cfeeea', '#f7d9e3', '#e3e6d0'),
 )
@@ -192,6 +191,14 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
             each.name: {'id': each.id, 'at': [each.x, each.y, each.z, each.yaw]}
             for each in plan.markers.values()
         },
+        'left_out': {
+            f'{number}': {
+                'at': list(part.at),
+                'area': round(part.area, 1),
+                'reason': part.reason(plan),
+            }
+            for number, part in enumerate(now.left_out, start=1)
+        },
         'start': place.start,
         'quiet_hours': described.get('quiet_hours', ''),
         'time_zone': described.get('time_zone', ''),
@@ -212,13 +219,15 @@ def _picture(editor: PlaceEditor) -> dict[str, Any]:
     same = open_grid.cells.shape == labels.shape and plan.is_enclosed
     if same:
         cells = np.where(open_grid.free & (labels >= 0), value[np.maximum(labels, 0)], cells)
+    for part in editor.now.left_out:
+        cells[part.cells] = _OUTSIDE if part.is_outside else _LEFT_OUT
     step = math.ceil(math.sqrt(cells.size / _MOST_PIXELS))
     rows, columns = (size // step * step for size in cells.shape)
     blocks = open_grid.occupied[:rows, :columns].reshape(rows // step, step, columns // step, step)
     pixels = cells[:rows:step, :columns:step].copy()
     pixels[blocks.any(axis=(1, 3))] = _WALL
     image = Image.fromarray(np.ascontiguousarray(pixels[::-1]), 'P')
-    palette = ['#808080', '#3a4350', '#ffffff', *_COLOURS]
+    palette = ['#808080', '#3a4350', '#ffffff', '#f3c6c0', '#e4e8ec', *_COLOURS]
     image.putpalette([part for colour in palette for part in ImageColor.getrgb(colour)[:3]])
     data = io.BytesIO()
     image.save(data, 'PNG', transparency=_UNKNOWN, optimize=False)

@@ -6,6 +6,7 @@ import copy
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.patrol_rules import PatrolRules, patrol_rules
-from floor_plans.room_map import ROBOT_RADIUS, RoomMap, check_passable
+from floor_plans.room_map import ROBOT_RADIUS, FloorPart, RoomMap, check_passable
 from floor_plans.rooms import Place, PlaceError
 from floor_plans.writing import updated_text
 from strict_files.files import FileError, in_one_line, replace_text
@@ -41,6 +42,11 @@ class Moment:
     regions: RoomMap
     rules: PatrolRules
     said: str = ''
+
+    @cached_property
+    def left_out(self) -> tuple[FloorPart, ...]:
+        """The parts of the floor that are no rooms, largest first."""
+        return self.regions.left_out()
 
 
 class PlaceEditor:

@@ -225,6 +225,36 @@ def remove_door(draft: Draft, name: str) -> str:
     return f'{name} is removed'
 
 
+def take_part(draft: Draft, x: float, y: float) -> str:
+    """Make a room of the part of the floor around a point; the walls that close it become doors."""
+    grid, regions = draft.regions.grid, draft.regions
+    parts = [each for each in regions.left_out() if grid.at(each.cells, x, y)]
+    if not parts:
+        there = regions.room_at(x, y) or 'no part of the floor'
+        raise ValueError(f'({x:.2f}, {y:.2f}) lies in {there}: expected a part that is no room')
+    part = parts[0]
+    if not part.ways:
+        raise ValueError(f'{part.reason(draft.plan)}: the robot cannot get in from any room')
+    point = free_point(grid, part.cells, draft.radius)
+    room = _next_name('R', _names(draft))
+    doors: list[str] = []
+    for wall_name, beside in part.ways.items():
+        wall = draft.plan.walls[wall_name]
+        (x1, y1), (x2, y2) = wall.start, wall.end
+        name = _next_name('D', {*_names(draft), *doors})
+        yaw = math.atan2(y2 - y1, x2 - x1)
+        door = Door(name, (x1 + x2) / 2, (y1 + y2) / 2, yaw, wall.length)
+        if door.width <= 2 * draft.radius and len(part.ways) > 1:
+            continue  # another way is wider
+        del draft.table('walls')[wall_name]
+        draft.table('doors')[name] = _row(door)
+        draft.table('map')[beside] = [*draft.table('map')[beside], name]
+        doors.append(name)
+    draft.table('map')[room] = doors
+    draft.table('room_positions')[room] = _rounded(*point)
+    return f'{room} is a room, joined by {" and ".join(doors)}'
+
+
 def rename(draft: Draft, kind: str, name: str, new: str) -> str:
     """Give a room, a door, a marker or a zone another name."""
     tables = {
@@ -451,7 +481,8 @@ def remove_marker(draft: Draft, name: str) -> str:
 OPERATIONS: Mapping[str, Callable[..., str]] = {
     each.__name__: each
     for each in (
-        *(cut, join, remove_room, move_door, set_door, add_door, remove_door, rename, move_point),
+        *(cut, join, take_part, remove_room, rename, move_point),
+        *(move_door, set_door, add_door, remove_door),
         *(move_station, add_station, remove_station),
         *(set_zone, remove_zone, set_rule, set_keep_out, set_text, set_marker, remove_marker),
     )

@@ -256,7 +256,8 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
         for each in openings
         if id(each) not in listed and set(each.rooms) <= rooms
     ]
-    exits = [each for each in openings if outside & set(each.rooms) and rooms & set(each.rooms)]
+    # What leads to a part that is no room is closed, or that part would be one with its neighbour.
+    exits = [each for each in openings if len(rooms & set(each.rooms)) == 1]
     closed = [_as_line(_longer(floor.world([each.start, each.end]), scale)) for each in exits]
     walls += closed
     lines = [Door(name, *row).ends for name, row in placed.items()]
@@ -286,7 +287,11 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     }
     if placed:
         parameters['doors'] = placed
-    wide = [line for each, line in zip(exits, closed, strict=True) if each.clearance > needed]
+    wide = [
+        line
+        for each, line in zip(exits, closed, strict=True)
+        if each.clearance > needed and outside & set(each.rooms)
+    ]
     walled = {line: f'entrance{index}' for index, line in enumerate(wide, start=1)}
     for line in walls:
         walled.setdefault(line, f'W{len(walled) - len(wide) + 1}')
@@ -298,7 +303,7 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     entrances = {
         walled[line]: names[next(number for number in each.rooms if number in rooms)]
         for each, line in zip(exits, closed, strict=True)
-        if each.clearance > needed
+        if line in wide
     }
     left_out = _left_out(floor, found, rooms, outside, openings)
     proposal = Proposal(parameters, found, names, left_out, entrances)

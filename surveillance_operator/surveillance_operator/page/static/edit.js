@@ -131,6 +131,10 @@ function draw() {
     grips.push(grip('marker', name, at));
     words.push(word(`${id}`, at, 11, -11));
   }
+  for (const [name, {at}] of Object.entries(place.left_out)) {
+    grips.push(grip('left_out', name, at));
+    words.push(word('+', at, 13, 5));
+  }
   for (const [name, {kind, corners, speed}] of Object.entries(place.zones)) {
     words.push(word(kind === 'slow' ? `${name} ${speed} m/s` : name, corners[0], 11, -8));
     if (is('zone', name)) corners.forEach((corner, index) => grips.push(grip('corner', name, corner, {'data-index': index})));
@@ -173,6 +177,10 @@ const FIELDS = {
       ...['x, m', 'y, m', 'direction, rad', 'width, m'].map((text, index) => [`at${index}`, text, at[index], set(index)]),
       ['remove', 'Remove the door', null, () => ['remove_door', {name}]],
     ];
+  },
+  left_out: (name) => {
+    const {at: [x, y], area, reason} = place.left_out[name];
+    return [['take', `Make a room of these ${area} m² (${reason})`, null, () => ['take_part', {x, y}]]];
   },
   zone: (name) => {
     const {kind, corners, speed} = place.zones[name];
@@ -228,13 +236,13 @@ async function commit(value, change, kind) {
   if (!found.ok) return false;
   if (operation === 'rename') choose({kind, name: fields.new});
   else if (operation === 'move_station') choose({kind, name: Object.keys(place.stations).find((room) => Math.hypot(place.stations[room][0] - fields.x, place.stations[room][1] - fields.y) < 0.01) ?? chosen.name});
-  else if (operation.startsWith('remove')) choose(null);
+  else if (operation.startsWith('remove') || operation === 'take_part') choose(null);
   else { panelShows = ''; panel(); }
   return true;
 }
 
 function field([key, text, value, change, options], kind) {
-  if (value === null && key === 'remove') return h('button', {type: 'button', disabled: !may, 'data-field': key, onclick: () => commit(null, change, kind)}, text);
+  if (value === null && ['remove', 'take'].includes(key)) return h('button', {type: 'button', disabled: !may, 'data-field': key, onclick: () => commit(null, change, kind)}, text);
   if (typeof value === 'boolean') {
     const box = h('input', {type: 'checkbox', disabled: !may, 'data-field': key, onchange: () => commit(box.checked, change, kind)});
     box.checked = value;
@@ -259,7 +267,7 @@ function field([key, text, value, change, options], kind) {
 let panelShows = '';
 function panel() {
   if (chosen && !FIELDS[chosen.kind]) chosen = null;
-  const table = chosen && {room: place.rooms, door: place.doors, zone: place.zones, station: place.stations, marker: place.markers}[chosen.kind];
+  const table = chosen && {room: place.rooms, door: place.doors, zone: place.zones, station: place.stations, marker: place.markers, left_out: place.left_out}[chosen.kind];
   if (table && !(chosen.name in table)) chosen = null;
   const shows = JSON.stringify([chosen, table?.[chosen?.name], place.start, place.quiet_hours, place.time_zone, names(place.rooms)]);
   $('file').textContent = place.file.split('/').at(-1);
@@ -277,7 +285,7 @@ function panel() {
   else form.append(h('p', {class: 'note'}, 'Choose something on the floor or in the list.'));
   $('chosen').replaceChildren(form);
   $('whole-place').replaceChildren(h('h3', {}, 'The whole place'), ...WHOLE().map((each) => field(each)));
-  const listed = [['room', place.rooms], ['door', place.doors], ['zone', place.zones], ['station', place.stations], ['marker', place.markers]];
+  const listed = [['room', place.rooms], ['door', place.doors], ['zone', place.zones], ['station', place.stations], ['marker', place.markers], ['left_out', place.left_out]];
   $('list').replaceChildren(h('option', {value: ''}, '–'), ...listed.flatMap(([kind, entries]) => names(entries).map((name) => h('option', {value: `${kind} ${name}`}, `${kind} ${name}`))));
   $('list').value = chosen ? `${chosen.kind} ${chosen.name}` : '';
 }
@@ -319,6 +327,12 @@ async function finish() {
 async function tap(point, target) {
   if (tool === 'select') {
     const {kind, name} = target?.dataset ?? {};
+    if (kind === 'left_out' && may) {
+      const {at: [x, y]} = place.left_out[name];
+      const found = await edit('take_part', {x, y});
+      choose(found.ok ? null : {kind, name});
+      return;
+    }
     if (kind && kind !== 'corner') { choose({kind, name}); return; }
     const room = await roomAt(point);
     choose(room && {kind: 'room', name: room});
