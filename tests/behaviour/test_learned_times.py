@@ -95,8 +95,8 @@ def test_visits_of_another_simulation_or_of_later_are_no_visits_of_now() -> None
     of_date.saw('A', date)
     of_date.saw('B', date + 30.0)
     of_date.tell_time(date + 29.5)
-    assert of_date.visits == {'A': date, 'B': date + 30.0}
+    assert of_date.visited_at == {'A': date, 'B': date + 30.0}
     of_date.tell_time(date - 3600.0)
-    ages = {place: date - 3600.0 - at for place, at in of_date.visits.items()}
+    ages = {place: date - 3600.0 - at for place, at in of_date.visited_at.items()}
     assert ages['B'] >= 0.0
     assert ages['A'] - ages['B'] == pytest.approx(30.0)
