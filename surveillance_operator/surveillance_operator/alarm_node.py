@@ -173,8 +173,18 @@ class Alarm(PatrolNode):
             self._sinks.outbox.close(SINK_PATIENCE)
 
     def _hear(self, told: IncidentUpdate, publisher: bytes) -> None:
+        teller = self._tellers.get(told.owner, publisher)
+        if told.over and teller != publisher and teller in self._there():
+            # Who can end another one's alarm can silence it.
+            text = f'another node says that {told.cause} of {told.owner} is over'
+            self.get_logger().error(f'{text}, which is not believed', throttle_duration_sec=10.0)
+            return
         self._tellers[told.owner] = publisher
         self._keeper.hear(told)
+
+    def _there(self) -> dict[bytes, str]:
+        """Return the names of the nodes that tell of incidents, by their publishers."""
+        return publishers_of(self, self.resolve_topic_name(TOPIC))
 
     def _look_for_restarts(self) -> None:
         """Have what a node told of end after its restart, unless it tells of it again."""
@@ -182,7 +192,7 @@ class Alarm(PatrolNode):
         self._tellers = {who: gid for who, gid in self._tellers.items() if who in waiting}
         if not self._tellers:
             return
-        there = publishers_of(self, self.resolve_topic_name(TOPIC))
+        there = self._there()
         self._names |= there
         for owner, publisher in list(self._tellers.items()):
             name = self._names.get(publisher)

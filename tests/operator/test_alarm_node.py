@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,8 @@ from rclpy.parameter import Parameter
 
 from surveillance_operator.alarm_node import Alarm
 from surveillance_runtime.event_log import RECORD, read
-from surveillance_runtime.incidents import Severity
+from surveillance_runtime.incident_topic import IncidentPublisher
+from surveillance_runtime.incidents import IncidentPhase, Severity
 from surveillance_runtime.node import PatrolNode
 
 DOOR = ('door', 'D1')
@@ -53,3 +55,17 @@ def test_a_changed_parameter_is_in_the_log(graph: Any, tmp_path: Path) -> None:
         return any((e.text('node'), e.text('name')) == ('robot_behavior', 'speed') for e in kept)
 
     graph.until(is_kept)
+
+
+def test_a_stranger_cannot_end_the_alarm_of_another_node(graph: Any, tmp_path: Path) -> None:
+    graph.add(Alarm, parameters={'folder': str(tmp_path)})
+    robot = graph.add(partial(PatrolNode, 'robot_behavior'))
+    stranger = graph.add(partial(PatrolNode, 'stranger'))
+    robot.incidents.begin(DOOR, 'D1 is closed', Severity.ALARM)
+    graph.until(lambda: ('D1', 'call') in phases(tmp_path))
+    (told,) = robot.incidents.updates()
+    said = graph.said()
+    IncidentPublisher(stranger).publish(replace(told, phase=IncidentPhase.END))
+    graph.until(lambda: any('which is not believed' in line for line in said))
+    robot.incidents.end(DOOR)
+    graph.until(lambda: ('D1', 'end') in phases(tmp_path))

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from launcher.run import Run
+from launcher.run_configuration import configuration
 from launcher.run_mission import summary
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator.recording.runs import robots_of
@@ -94,3 +96,10 @@ def test_the_page_has_a_button_for_each_mark() -> None:
     page = Path(__file__).parents[2] / 'surveillance_operator/surveillance_operator/page/static'
     buttons = re.findall(r'data-jump="(\w+)"', (page / 'index.html').read_text('utf-8'))
     assert sorted(buttons) == sorted(MARKS)
+
+
+def test_a_resumed_run_of_an_earlier_version_writes_where_it_wrote(old_run: Path) -> None:
+    config = Path(__file__).parents[2] / 'config'
+    merged = configuration(config, Run(), old_run)
+    for node in ('robot_behavior', 'reasoner', 'observer'):
+        assert merged.resolve(node, f'/{node}')['record'].value == str(old_run / 'mission.jsonl')
