@@ -40,6 +40,10 @@ td,th{padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top;border-bott
 .quiet{color:#777}"""
 
 
+NEWEST = 'last'
+"""Names the newest day there is."""
+
+
 def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
     """Write the report of a day into a run's folder; return its path.
 
@@ -51,6 +55,7 @@ def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
     Raises:
         FileError: The run has no observer, or nothing of that day.
     """
+    day = _named(day)
     path = folder / OBSERVER
     if not path.exists():
         raise FileError(f'{folder}: nothing was watched, expected a run with --watch')
@@ -61,7 +66,8 @@ def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
         events = _findings(folder, kept['book']['events'])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise FileError(f'{path}: cannot be read: {error!s:.100}') from None
-    wanted = _day(day, book)
+    newest = book.days()[-1] if book.days() else date.today().isoformat()
+    wanted = newest if day == NEWEST else day
     begin = datetime.fromisoformat(wanted).timestamp()
     end = (datetime.fromisoformat(wanted) + timedelta(days=1)).timestamp()
     of_day = [each for each in events if each.began < end and each.last >= begin]
@@ -76,12 +82,16 @@ def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
     return written
 
 
-def _day(text: str, book: DayBook) -> str:
-    today = date.today()
+def _named(text: str) -> str:
+    """Return the day that a text names, as 2026-03-01, or `NEWEST`.
+
+    Raises:
+        FileError: It names none.
+    """
+    if text == NEWEST:
+        return text
     if text in ('today', 'yesterday'):
-        return (today - timedelta(days=text == 'yesterday')).isoformat()
-    if text == 'last':
-        return book.days()[-1] if book.days() else today.isoformat()
+        return (date.today() - timedelta(days=text == 'yesterday')).isoformat()
     try:
         return date.fromisoformat(text).isoformat()
     except ValueError:

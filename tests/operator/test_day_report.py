@@ -110,3 +110,10 @@ def test_the_book_of_days_is_bounded_and_comes_back(monkeypatch: pytest.MonkeyPa
     again = DayBook(datetime.fromtimestamp)
     again.restore(json.loads(json.dumps(days.state())))
     assert again.state() == days.state()
+
+
+def test_a_day_that_is_none_is_named_also_where_nothing_was_watched(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"--day '2026-13-45': expected such as 2026-03-01"):
+        write_day(tmp_path, '2026-13-45')
+    with pytest.raises(FileError, match='nothing was watched'):
+        write_day(tmp_path, '2026-03-01')
