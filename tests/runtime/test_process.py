@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
-from pathlib import Path
 
-import pytest
 import rclpy
 from builtin_interfaces.msg import Time
 from rclpy.clock import JumpThreshold
@@ -16,7 +13,6 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from surveillance_runtime.discovery import prefer_quick_discovery
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import ExecutorThread, share_clock
 
@@ -39,20 +35,6 @@ def test_nodes_compute_on_one_thread_whatever_was_imported_before() -> None:
         [sys.executable, '-c', PROGRAM], capture_output=True, text=True, timeout=60
     )
     assert "{'blas': 1" in done.stdout, done
-
-
-def test_a_process_finds_its_peers_quickly_unless_told_how(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_BUILTIN_TRANSPORTS'):
-        monkeypatch.setenv(name, '')
-        monkeypatch.delenv(name)
-    prefer_quick_discovery()
-    profile = Path(os.environ['FASTRTPS_DEFAULT_PROFILES_FILE']).read_text()
-    assert '<leaseAnnouncement>' in profile
-    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', 'mine.xml')
-    prefer_quick_discovery()
-    assert os.environ['FASTRTPS_DEFAULT_PROFILES_FILE'] == 'mine.xml'
 
 
 def test_nodes_of_one_process_hear_the_clock_once_and_each_keeps_its_own(
@@ -99,31 +81,6 @@ def test_nodes_of_one_process_hear_the_clock_once_and_each_keeps_its_own(
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown(context=context)
-
-
-SECURED = """
-import sys
-from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.process import run_node
-
-sys.exit(run_node(lambda: PatrolNode('secured'), []))
-"""
-
-
-def test_a_ros_without_dds_security_says_so_in_one_line() -> None:
-    secured = {
-        **os.environ,
-        'ROS_SECURITY_ENABLE': 'true',
-        'ROS_SECURITY_STRATEGY': 'Enforce',
-        'ROS_SECURITY_KEYSTORE': '',
-    }
-    done = subprocess.run(
-        [sys.executable, '-c', SECURED], capture_output=True, text=True, timeout=60, env=secured
-    )
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert done.stderr.startswith('cannot start: ')
-    assert 'expected a ROS with DDS security' in done.stderr
 
 
 STUCK = """

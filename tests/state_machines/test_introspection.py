@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 
 import pytest
-from builtin_interfaces.msg import Time
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import Trigger
 
 from libs.state_machines.tests.states import Answer, Background, began
 from state_machines.ros import ServiceCaller
-from state_machines.transitions import Transition
 from surveillance_interfaces.msg import (
     FsmStatus,
     FsmStructure,
@@ -19,7 +17,6 @@ from surveillance_interfaces.msg import (
     SmachContainerStatus,
 )
 from surveillance_interfaces.srv import ForceOutcome, SetAutonomy, SetInitialState
-from surveillance_runtime.machine_messages import transition_message
 
 from .ros_servers import introspected
 
@@ -188,15 +185,3 @@ def test_a_wrong_outcome_is_not_forced(graph, watched):
         assert words in answer.message
     root.request_preempt()
     assert run.result() == 'preempted'
-
-
-def test_a_transition_is_told_whole():
-    transition = Transition(
-        3, 12.5, 'A/B', 'C', 'done', 'D', 'transition', 0.25, 2, {'x': [1, {'y': None}]}
-    )
-    message = transition_message(transition, ['A/B'], Time(sec=12, nanosec=500_000_000))
-    for name in ('sequence', 'path', 'from_state', 'outcome', 'to_state', 'kind', 'duration'):
-        assert getattr(message, name) == getattr(transition, name)
-    assert (message.visits, message.active) == (2, ['A/B'])
-    told = dict(zip(message.userdata_keys, message.userdata_values, strict=True))
-    assert {key: json.loads(value) for key, value in told.items()} == transition.userdata
