@@ -184,7 +184,7 @@ class Explorer(PatrolNode):
     def _on_odometry(self, reading: Pose, measured: float) -> None:
         with self._lock:
             self._base.hear('odom')
-            pose = reading if self._continuous is None else self._continuous.take(reading)
+            pose = reading if self._continuous is None else self._continuous.take(reading, measured)
             self._readings.add(measured, pose)
             self._odometry, self._reading = pose, reading
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from floor_plans import Grid
 from lidar_navigation import Localiser
-from lidar_navigation.geometry import Points, Pose, Scan
-from lidar_navigation.localisation.localisation import _apart, _overlap, _Rival
+from lidar_navigation.geometry import Pose, Scan
+from lidar_navigation.localisation.localisation import _Rival
+from lidar_navigation.localisation.pose_search import _apart, _overlap
 
 HERE = (5.0, 5.0, 0.0)
 CLOSE = (5.6, 5.0, 0.0)
@@ -30,21 +33,20 @@ class Told(Localiser):
         self.finds: list[tuple[Pose, float]] = []
         self.searches = self.warnings = 0
         super().__init__(Grid(np.zeros((40, 40), np.int8), 0.5, (0.0, 0.0)), pose, self._warn)
+        self.refutes = True
+        fit: Any = self._fit
+        fit.matched = lambda pose, points, moved: pose
+        fit.evidence = lambda pose, scan: SimpleNamespace(
+            fit=self.worth(pose), hit=self.worth(pose), refutes=self.refutes
+        )
 
     def _warn(self) -> None:
         self.warnings += 1
-
-    def explained(self, pose: Pose, scan: Scan) -> float:
-        """Return what the test says."""
-        return self.worth(pose)
 
     def search(self, scan: Scan) -> list[tuple[Pose, float]]:
         """Return what the test says."""
         self.searches += 1
         return list(self.finds)
-
-    def _matched(self, pose: Pose, points: Points, moved: tuple[float, float]) -> Pose:
-        return pose
 
     def agrees(self, share: float, now: float) -> None:
         """See a scan of which every pose explains so much."""
@@ -432,3 +434,20 @@ def test_poses_that_are_nearly_the_same_are_tried_once() -> None:
     assert _apart(poses, 9, 0.5) == [*taken, (3, 0, 0)]
     assert _apart(poses[:0], 3, 0.5) == []
     assert _apart(np.array([(0, 0, 3.1), (0, 0, -3.1)]), 3, 0.5) == [(0, 0, 3.1)]
+
+
+def test_a_pose_that_something_new_explains_is_kept_however_well_another_fits() -> None:
+    localiser = Told()
+    localiser.refutes = False
+    localiser.finds = [(FAR, 0.97)]
+    localiser.worth = lambda pose: 0.97 if pose[0] > 10.0 else 0.6
+    for step in range(40):
+        moved(localiser, 0.1)
+        localiser.see(SCAN, 0.2 * step)
+    assert localiser.jumps == 0
+    assert not localiser.ambiguous
+    localiser.refutes = True
+    for step in range(40, 60):
+        moved(localiser, 0.1)
+        localiser.see(SCAN, 0.2 * step)
+    assert localiser.jumps == 1

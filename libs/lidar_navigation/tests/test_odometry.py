@@ -13,8 +13,9 @@ from lidar_navigation.geometry import Pose, Scan, composed, relative
 from lidar_navigation.localisation.odometry import (
     ContinuousOdometry,
     OdometryBuffer,
-    is_jump,
+    began_anew,
     joined,
+    joined_if_known,
 )
 
 
@@ -164,16 +165,71 @@ def test_a_scan_of_one_moment_is_seen_from_where_the_lidar_was_then() -> None:
     assert joined(at_once, buffer, 0.5).mount == seen.mount
 
 
-def test_what_no_robot_drives_between_two_readings_is_a_jump() -> None:
+@pytest.mark.parametrize(
+    ('step', 'seconds', 'anew'),
+    [
+        ((0.29, 0.0, 0.59), None, False),
+        ((0.0, -0.31, 0.0), None, True),
+        ((0.3, 0.3, 0.0), 0.02, True),
+        ((0.0, 0.0, -0.7), 0.02, True),
+        # Readings were lost: it drove on at .6 m/s, and turned at 1.5 rad/s.
+        ((0.31, 0.0, 0.75), 0.5, False),
+        ((1.2, 0.0, 3.0), 2.0, False),
+        ((2.0, 0.0, 0.0), 0.5, True),
+        ((0.5, 0.0, 0.0), -3.0, True),
+    ],
+)
+def test_what_no_robot_drives_in_the_time_between_two_readings_is_a_new_beginning(
+    step: Pose, seconds: float | None, anew: bool
+) -> None:
     first = (1.0, 2.0, 3.0)
-    for step, jumps in (
-        ((0.29, 0.0, 0.0), False),
-        ((0.0, -0.31, 0.0), True),
-        ((0.25, 0.25, 0.0), True),
-        ((0.0, 0.0, 0.59), False),
-        ((0.0, 0.0, -0.61), True),
-    ):
-        assert is_jump(first, composed(first, step)) is jumps
+    assert began_anew(first, composed(first, step), seconds) is anew
+
+
+def test_a_reading_near_zero_after_a_silence_is_a_new_beginning_and_one_driven_to_is_not() -> None:
+    assert began_anew((0.5, 0.4, 0.2), (0.02, -0.01, 0.0), 1.0)
+    assert not began_anew((0.05, 0.03, 0.0), (0.03, 0.02, 0.0), 0.02)
+
+
+@pytest.mark.parametrize('silent', [0.1, 0.5, 2.0])
+def test_a_silence_of_the_odometry_costs_no_pose(flat: Any, silent: float) -> None:
+    """It turns at 1.5 rad/s, and drives; the reading after the gap is the truth."""
+    true, localiser, off, turned = (2.0, 1.5, 0.0), Localiser(flat.grid, (2.0, 1.5, 0.0)), [], []
+    buffer = OdometryBuffer()
+    for tick in range(300):
+        now = 0.02 * tick
+        if not 2.0 < now < 2.0 + silent:
+            localiser.move(true, now)
+            buffer.add(now, true)
+            if tick % 5 == 0:
+                localiser.see(flat.scan(true), now)
+                off.append(math.dist(localiser.pose[:2], true[:2]))
+                turned.append(abs(math.remainder(localiser.pose[2] - true[2], math.tau)))
+        true = composed(true, (0.006, 0.0, 0.03))
+    assert max(off) < 0.1
+    assert max(turned) < math.radians(3.0)
+    assert localiser.jumps == 0
+
+
+def test_where_the_odometry_began_anew_what_was_missed_widens_the_search(flat: Any) -> None:
+    localiser, true = Localiser(flat.grid, (1.0, 0.8, 0.0)), (1.0, 0.8, 0.0)
+    for tick in range(50):
+        localiser.move(true, 0.02 * tick)
+        if tick % 5 == 0:
+            localiser.see(flat.scan(true), 0.02 * tick)
+        true = composed(true, (0.012, 0.0, 0.0))
+    true = composed(true, (0.2, 0.0, 0.1))
+    localiser.move((0.01, 0.0, 0.0), 1.4)
+    for step in range(4):
+        localiser.see(flat.scan(true), 1.4 + 0.1 * step)
+    assert math.dist(localiser.pose[:2], true[:2]) < 0.05
+
+
+def test_a_scan_of_a_time_of_which_nothing_is_known_is_told_as_such(flat: Any) -> None:
+    scan = flat.scan(moving(0.0))
+    assert joined_if_known(scan, OdometryBuffer(), 1.0) is None
+    assert joined_if_known(scan, readings(3.0), 0.5) is None
+    assert joined_if_known(scan, readings(3.0), 2.9) is not None
 
 
 def test_readings_are_kept_for_two_seconds_and_in_their_order() -> None:

@@ -206,7 +206,7 @@ class Navigator:
             self._readings.add(stamp, odometry)
         self._odometry = odometry
         if self._localiser is not None:
-            self._localiser.move(odometry)
+            self._localiser.move(odometry, stamp)
 
     def told_pose(self, stamp: float) -> tuple[Pose, float] | None:
         """Return where the robot is and the time of that, seconds, at least that of a scan.

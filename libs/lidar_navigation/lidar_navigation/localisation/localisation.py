@@ -27,13 +27,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from floor_plans import Grid
-from floor_plans.occupancy_grid import distance_to
-from lidar_navigation.geometry import Points, Pose, Scan, angle_between, composed, in_map, relative
-from lidar_navigation.localisation.odometry import is_jump
+from lidar_navigation.geometry import Pose, Scan, angle_between, composed
+from lidar_navigation.localisation.odometry import ContinuousOdometry
+from lidar_navigation.localisation.pose_search import found_poses
+from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
 
 
 @dataclass(frozen=True)
@@ -46,14 +44,11 @@ class LocalisationParameters:
         update_distance: A scan is used after this way, metres,
         update_turn: or this turn, rad,
         update_period: or this time, seconds; and always while the robot doubts.
-        hit: A ray agrees with the map when it is off by at most this, metres.
-        spread: Points further than about this from any edge lose their weight, metres.
         doubt_below: The robot looks for a better pose when a smaller part of the rays agrees,
         doubt_drop: and less than is usual here by this much.
         usual_rise: By this part of the difference the usual agreement rises with a scan;
         usual_fall: by this part it falls.
         lost_below: It counts as lost when none is found and a smaller part than this agrees.
-        sure_from: A pose near the last one that explains this part ends the search.
         better: A pose near the last one must explain this much more to be taken instead.
         far_better: A pose far away must explain this much more to become a rival: that somebody
             carried the robot there is unlikely.
@@ -78,9 +73,6 @@ class LocalisationParameters:
         near: Radius of the first search around the last pose, metres.
         at_once: A better pose within this distance is taken at once, metres; a farther one is
             followed first.
-        lattice: Distance of the poses that a search tries, metres.
-        headings: How many headings a search tries at each.
-        body: Radius within which the robot cannot overlap anything, metres.
     """
 
     rays: int = 90
@@ -88,14 +80,11 @@ class LocalisationParameters:
     update_distance: float = 0.15
     update_turn: float = 0.15
     update_period: float = 0.3
-    hit: float = 0.15
-    spread: float = 0.2
     doubt_below: float = 0.85
     doubt_drop: float = 0.12
     usual_rise: float = 0.05
     usual_fall: float = 0.02
     lost_below: float = 0.55
-    sure_from: float = 0.93
     better: float = 0.1
     far_better: float = 0.2
     same_way: float = 0.8
@@ -115,9 +104,6 @@ class LocalisationParameters:
     lost_pause: float = 1.0
     near: float = 2.5
     at_once: float = 1.0
-    lattice: float = 0.25
-    headings: int = 24
-    body: float = 0.15
 
 
 @dataclass
@@ -163,7 +149,7 @@ class Localiser:
         self.agreement = 1.0
         self.lost = False
         self.jumps = 0
-        self._odometry: Pose | None = None
+        self._odometry = ContinuousOdometry()
         self._look_at: float | None = None
         self._tolerated = 1.0
         self._usual = 1.0
@@ -176,19 +162,12 @@ class Localiser:
 
     def set_map(self, grid: Grid) -> None:
         """Replace the map; the estimate stays."""
-        self.grid = grid
-        half = np.float32(grid.resolution / 2)
-        occupied = grid.occupied
-        outside = distance_to(occupied, grid.resolution)
-        inside = distance_to(~occupied, grid.resolution)
-        signed = np.where(occupied, half - inside, outside - half)
-        # With nothing or everything occupied nothing is to match: one finite value, no slope.
-        self._edges: NDArray[np.float32] = np.clip(signed, -10.0, 10.0)
-        # A slope needs two cells.
-        short = [(0, max(0, 2 - count)) for count in signed.shape]
-        self._edges = np.pad(self._edges, short, mode='edge')
-        self._occupied = occupied
-        self._standable = grid.free & (outside - half >= self.parameters.body)
+        self._fit = ScanFit(grid)
+
+    @property
+    def grid(self) -> Grid:
+        """The map."""
+        return self._fit.grid
 
     @property
     def plausible(self) -> bool:
@@ -222,17 +201,20 @@ class Localiser:
         self._used_at = None
         self._rivals.clear()
 
-    def move(self, odometry: Pose) -> None:
-        """Take a new reading of the odometry, in the odometry's own frame."""
-        if self._odometry is not None:
-            dx, dy, turn = relative(self._odometry, odometry)
-            step = math.hypot(dx, dy)
-            if not is_jump(self._odometry, odometry):
-                self.pose = composed(self.pose, (dx, dy, turn))
-                for rival in self._rivals:
-                    rival.pose = composed(rival.pose, (dx, dy, turn))
-                self._moved = (self._moved[0] + step, self._moved[1] + abs(turn))
-        self._odometry = odometry
+    def move(self, odometry: Pose, stamp: float | None = None) -> None:
+        """Take a new reading of the odometry.
+
+        Args:
+            odometry: In the odometry's own frame.
+            stamp: Its time, seconds; None: not known.
+        """
+        step, missed = self._odometry.step(odometry, stamp)
+        self.pose = composed(self.pose, step)
+        for rival in self._rivals:
+            rival.pose = composed(rival.pose, step)
+        # What was missed counts as driven: the next scan is sought so much farther away.
+        way = math.hypot(*step[:2]) + missed[0]
+        self._moved = (self._moved[0] + way, self._moved[1] + abs(step[2]) + missed[1])
 
     def see(self, scan: Scan, now: float) -> bool:
         """Take a scan made where the robot is now: correct the estimate, or look for it.
@@ -250,51 +232,61 @@ class Localiser:
         self._used_at = now
         thin = scan.thinned(p.rays)
         moved, self._moved = self._moved, (0.0, 0.0)
-        corrected = self._matched(self.pose, thin.points, moved)
-        agreement = self.explained(corrected, thin.thinned(p.cast_rays))
+        slack = self.grid.resolution + 0.2 * moved[0] + moved[1]
+        corrected = self._fit.matched(
+            self.pose, self._fit.mapped(self.pose, thin, slack).points, moved
+        )
+        rays = thin.thinned(p.cast_rays)
+        evidence = self._fit.evidence(corrected, rays)
+        agreement = evidence.fit
         if agreement < self._enough:
             before = corrected
-            corrected, agreement = self._nudged(corrected, agreement, thin, moved)
+            corrected, evidence = self._nudged(corrected, evidence, thin, moved)
+            agreement = evidence.fit
             way, turn = math.dist(before[:2], corrected[:2]), angle_between(before[2], corrected[2])
             if way > p.nudge or abs(turn) > p.nudge:
                 # Somebody may have put it into another room that looks alike.
                 self._shaken = True
-        winner = self._weighed(corrected, agreement, thin, moved)
+        winner = self._weighed(corrected, evidence, thin, moved)
         if winner is not None:
             self.jumps += 1
-            corrected, agreement = winner
+            corrected, evidence = winner
             # Also where it does not explain enough to be sure of.
             self.pose = corrected
-        self._judge(corrected, agreement, thin, now)
+        self._judge(corrected, evidence, thin, now)
         return True
 
     def _nudged(
-        self, pose: Pose, agreement: float, thin: Scan, moved: tuple[float, float]
-    ) -> tuple[Pose, float]:
+        self, pose: Pose, evidence: Evidence, thin: Scan, moved: tuple[float, float]
+    ) -> tuple[Pose, Evidence]:
         """Return a pose close by that explains more, as after a slip; else the same pose."""
         rays = thin.thinned(self.parameters.cast_rays)
-        best = pose, agreement
+        best, more = (pose, evidence), self.parameters.better
         for turn in (-0.3, -0.15, 0.0, 0.15, 0.3):
             for dx, dy in ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25)):
                 start = composed(pose, (dx, dy, turn))
-                tried = self._matched(start, thin.points, (moved[0] + 0.3, moved[1] + 0.3))
-                explained = self.explained(tried, rays)
-                if explained > best[1] + 0.02 and self._can_stand(tried):
-                    best = tried, explained
+                tried = self._fit.matched(start, thin.points, (moved[0] + 0.3, moved[1] + 0.3))
+                explained = self._fit.evidence(tried, rays)
+                if explained.fit > best[1].fit + more and self._fit.can_stand(tried):
+                    best, more = (tried, explained), 0.0
         return best
 
     def _weighed(
-        self, present: Pose, agreement: float, thin: Scan, moved: tuple[float, float]
-    ) -> tuple[Pose, float] | None:
+        self, present: Pose, evidence: Evidence, thin: Scan, moved: tuple[float, float]
+    ) -> tuple[Pose, Evidence] | None:
         """Correct the rivals by a scan; return the one that wins over the present pose, if any."""
         p = self.parameters
-        best: tuple[_Rival, float] | None = None
+        best: tuple[_Rival, Evidence] | None = None
         moves = moved[0] >= p.update_distance / 2 or moved[1] >= p.update_turn / 2
-        plausible = agreement >= self._enough
+        # What is new may explain all that speaks against it.
+        plausible = evidence.fit >= self._enough or not evidence.refutes
         for rival in self._rivals:
-            rival.pose = self._matched(rival.pose, thin.points, moved)
-            explained = self.explained(rival.pose, thin.thinned(p.cast_rays))
-            more = explained - agreement
+            rival.pose = self._fit.matched(rival.pose, thin.points, moved)
+            explained = self._fit.evidence(rival.pose, thin.thinned(p.cast_rays))
+            more = explained.fit - evidence.fit
+            if rival.is_equal:
+                # Neither was believed before: a wall where the map has a door tells them apart.
+                more = explained.hit - evidence.hit
             if moves:
                 # What tells nothing makes nothing forgotten, either.
                 if abs(more) > p.noise:
@@ -303,7 +295,7 @@ class Localiser:
                     rival.lead -= p.challenger
             elif abs(more) >= p.standing_from:
                 rival.lead += p.standing * more - p.forgotten * rival.lead
-            if not self._can_stand(rival.pose) or self._same(rival.pose, present):
+            if not self._fit.can_stand(rival.pose) or self._same(rival.pose, present):
                 rival.lead = -math.inf
             elif (
                 (rival.is_equal or not plausible)
@@ -340,8 +332,8 @@ class Localiser:
             or now - self._used_at >= p.update_period
         )
 
-    def _judge(self, corrected: Pose, agreement: float, thin: Scan, now: float) -> None:
-        p = self.parameters
+    def _judge(self, corrected: Pose, evidence: Evidence, thin: Scan, now: float) -> None:
+        p, agreement = self.parameters, evidence.fit
         enough = self._enough
         if agreement >= enough:
             self._tolerated = 1.0
@@ -368,7 +360,8 @@ class Localiser:
             return
         self._before_search()
         candidates = self.search(thin)
-        found = candidates[0] if candidates else None
+        # A pose that something new explains is kept, however well another one fits.
+        found = candidates[0] if candidates and evidence.refutes else None
         if found is not None and self._is_near(found[0]) and self._is_better(found, agreement):
             self.jumps += 1
             self._settle(*found)
@@ -441,29 +434,6 @@ class Localiser:
             rate = 0.2
         self._usual += rate * (agreement - self._usual)
 
-    def search(self, scan: Scan) -> list[tuple[Pose, float]]:
-        """Look everywhere for poses that explain a scan.
-
-        Returns:
-            Poses and the part of the rays each explains, the likeliest first; empty when the scan
-            shows too little. Of poses that explain as much, one near the last pose comes first.
-        """
-        p = self.parameters
-        points = scan.thinned(40).points
-        if len(points) < 8:
-            return []
-        places, scores = self._scored(points)
-        within = np.hypot(*(places - self.pose[:2]).T) <= p.near
-        found = self._refined(places[within], scores[:, within], 24, scan)
-        near = max(found, key=lambda each: self._worth(*each), default=None)
-        found += self._refined(places, scores, p.most_rivals, scan)
-        found.sort(key=lambda each: -self._worth(*each))
-        if near is not None and near[1] >= p.sure_from:
-            # That somebody carried the robot far away is unlikely.
-            found.remove(near)
-            found.insert(0, near)
-        return found
-
     def _alike(self, candidates: list[tuple[Pose, float]]) -> list[_Rival]:
         """Return the candidates that explain about as much as the first."""
         p = self.parameters
@@ -480,152 +450,10 @@ class Localiser:
         turned = abs(angle_between(self.pose[2], pose[2]))
         return explained - 0.003 * min(math.dist(pose[:2], self.pose[:2]), 20.0) - 0.02 * turned
 
+    def search(self, scan: Scan) -> list[tuple[Pose, float]]:
+        """Return poses anywhere that explain a scan, and how well, the likeliest first."""
+        return found_poses(self._fit, scan, self.pose)
+
     def explained(self, pose: Pose, scan: Scan) -> float:
-        """Return the part of a scan's rays that go as far as they should from a pose, 0 to 1."""
-        expected = self.cast(composed(pose, scan.mount), scan.angles, scan.range_max)
-        off = np.abs(expected - np.minimum(scan.ranges, scan.range_max))
-        off = off[~np.isnan(off)]
-        slack = self.parameters.hit + self.grid.resolution / 2
-        return float((off <= slack).mean()) if len(off) else 0.0
-
-    def cast(self, pose: Pose, angles: Points, range_max: float) -> Points:
-        """Return how far rays go in the map from a pose until they meet something occupied.
-
-        Returns:
-            Shape of `angles`, metres, at most `range_max`; to half a cell.
-        """
-        step = self.grid.resolution / 2
-        # Nothing of the map is farther away than its diagonal is long.
-        rows, columns = self._occupied.shape
-        diagonal = math.hypot(rows, columns) * self.grid.resolution
-        way = np.arange(0.0, min(range_max, diagonal) + step, step)
-        heading = angles + pose[2]
-        x = pose[0] + np.cos(heading)[:, None] * way
-        y = pose[1] + np.sin(heading)[:, None] * way
-        column = ((x - self.grid.origin[0]) * (1 / self.grid.resolution)).astype(np.int32)
-        row = ((y - self.grid.origin[1]) * (1 / self.grid.resolution)).astype(np.int32)
-        np.clip(column, 0, columns - 1, out=column)
-        np.clip(row, 0, rows - 1, out=row)
-        hit = self._occupied.ravel().take(row * columns + column)
-        first = hit.argmax(axis=1)
-        met = hit[np.arange(len(angles)), first]
-        return np.where(met, np.minimum(way[first], range_max), range_max)
-
-    def _matched(self, pose: Pose, points: Points, moved: tuple[float, float]) -> Pose:
-        """Return the pose near `pose` at which points (robot's frame) lie on the map's edges."""
-        if len(points) < 8:
-            return pose
-        estimate = np.array(pose)
-        # Pull towards the odometry: a standard deviation per direction, beside 3 cm of a point.
-        deviation = np.array([0.05 + 0.2 * moved[0]] * 2 + [0.04 + 0.1 * moved[0] + 0.2 * moved[1]])
-        pull = (0.03 / deviation) ** 2
-        for _ in range(8):
-            cos, sin = math.cos(estimate[2]), math.sin(estimate[2])
-            x = estimate[0] + cos * points[:, 0] - sin * points[:, 1]
-            y = estimate[1] + sin * points[:, 0] + cos * points[:, 1]
-            error, slope_x, slope_y = self._edge_at(x, y)
-            weight = 1.0 / (1.0 + (error / self.parameters.spread) ** 2) ** 2
-            slope_turn = slope_y * (x - estimate[0]) - slope_x * (y - estimate[1])
-            jacobian = np.array([slope_x, slope_y, slope_turn])
-            weighted = jacobian * weight
-            back = estimate - pose
-            back[2] = angle_between(pose[2], estimate[2])
-            change = np.linalg.solve(
-                weighted @ jacobian.T + np.diag(pull + 1e-9), -(weighted @ error + pull * back)
-            )
-            estimate += np.minimum(np.maximum(change, -0.15), 0.15)
-            if np.abs(change).max() < 1e-4:
-                break
-        return float(estimate[0]), float(estimate[1]), math.remainder(estimate[2], math.tau)
-
-    def _edge_at(self, x: Points, y: Points) -> tuple[Points, Points, Points]:
-        """Signed distance to the nearest edge and its slope along x and y, bilinear."""
-        column = (x - self.grid.origin[0]) / self.grid.resolution - 0.5
-        row = (y - self.grid.origin[1]) / self.grid.resolution - 0.5
-        rows, columns = self._edges.shape
-        column = np.minimum(np.maximum(column, 0), columns - 1.001)
-        row = np.minimum(np.maximum(row, 0), rows - 1.001)
-        c, r = column.astype(np.intp), row.astype(np.intp)
-        u, v = column - c, row - r
-        flat = self._edges.ravel()
-        base = r * columns + c
-        sw, se, nw, ne = flat[base], flat[base + 1], flat[base + columns], flat[base + columns + 1]
-        south, north = sw + (se - sw) * u, nw + (ne - nw) * u
-        slope_x = ((se - sw) * (1 - v) + (ne - nw) * v) / self.grid.resolution
-        slope_y = (north - south) / self.grid.resolution
-        return south + (north - south) * v, slope_x, slope_y
-
-    def _can_stand(self, pose: Pose) -> bool:
-        return bool(self.grid.at(self._standable, *pose[:2]))
-
-    @property
-    def _headings(self) -> Points:
-        """The headings that a search tries, shape (n,), rad."""
-        count = self.parameters.headings
-        return np.asarray(self.pose[2] + np.arange(count) * (math.tau / count), np.float64)
-
-    def _scored(self, points: Points) -> tuple[Points, NDArray[np.float32]]:
-        """Return how well points fit the edges from each place of a lattice with each heading.
-
-        The lattice's places are cells, so that for one heading each point adds a shifted image of
-        the map (Olson, "Real-time correlative scan matching", ICRA 2009).
-
-        Args:
-            points: What is seen, robot's frame, shape (n, 2), metres.
-
-        Returns:
-            The places on which the robot can stand, shape (m, 2), metres; the scores, shape
-            (headings, m), the greater the better.
-        """
-        step = max(1, round(self.parameters.lattice / self.grid.resolution))
-        fit = np.exp(-0.5 * (self._edges / np.float32(0.2)) ** 2)
-        images = [
-            [fit[up::step, right::step].copy() for right in range(step)] for up in range(step)
-        ]
-        can_stand = self._standable[::step, ::step]
-        scores = []
-        for yaw in self._headings.tolist():
-            fits: NDArray[np.float32] = np.zeros(can_stand.shape, np.float32)
-            turned = in_map((0.0, 0.0, yaw), points) / self.grid.resolution
-            for right, up in np.rint(turned).astype(int).tolist():
-                image = images[up % step][right % step]
-                rows, image_rows = _overlap(up // step, len(fits), len(image))
-                columns, image_columns = _overlap(right // step, fits.shape[1], image.shape[1])
-                fits[rows, columns] += image[image_rows, image_columns]
-            scores.append(fits[can_stand])
-        return self.grid.centres_of(step * np.argwhere(can_stand)), np.array(scores)
-
-    def _refined(
-        self, places: Points, scores: NDArray[np.float32], count: int, scan: Scan
-    ) -> list[tuple[Pose, float]]:
-        """Refine a lattice's best poses; return them with the part of the rays each explains."""
-        most = 60 * count
-        # The best poses are at the best places.
-        best = np.argsort(-scores.max(axis=0))[:most]
-        heading, place = np.divmod(np.argsort(-scores[:, best], axis=None)[:most], len(best))
-        poses = np.column_stack([places[best[place]], self._headings[heading]])
-        tried = _apart(poses, count, 2 * self.parameters.lattice)
-        refined = [self._matched(pose, scan.points, (1.0, 1.0)) for pose in tried]
-        return [(pose, self.explained(pose, scan)) for pose in refined if self._can_stand(pose)]
-
-
-def _overlap(shift: int, count: int, image: int) -> tuple[slice, slice]:
-    """Return which of `count` cells lie on an image that is shifted back, and where on it."""
-    first = max(0, -shift)
-    end = max(first, min(count, image - shift))
-    return slice(first, end), slice(first + shift, end + shift)
-
-
-def _apart(poses: Points, count: int, distance: float) -> list[Pose]:
-    """Return the first poses that are not all the same: some way or turn lies between any two."""
-    taken: list[Pose] = []
-    for x, y, yaw in poses.tolist():
-        if all(
-            math.hypot(x - other[0], y - other[1]) > distance
-            or abs(angle_between(other[2], yaw)) > 0.4
-            for other in taken
-        ):
-            taken.append((x, y, yaw))
-            if len(taken) == count:
-                break
-    return taken
+        """Return how well a pose explains a scan, 0 to 1 (`Evidence.fit`)."""
+        return self._fit.evidence(pose, scan).fit

@@ -24,31 +24,72 @@ _VELOCITY_OVER = 0.1
 LATE = 0.1
 """A reading that is older than the one before by this much, seconds, or less came late; by more,
 the clock was set back."""
-TOP_STEP, TOP_TURN = 0.3, 0.6
-"""Odometry that moves further between two readings, metres or rad, began anew."""
+_SMALL_STEP, _SMALL_TURN = 0.3, 0.6
+"""A step of at most this between two readings, metres or rad, was driven, whatever their times."""
+_TOP_SPEED, _TOP_TURN = 3.0, 4.0
+"""No robot of this kind drives or turns faster, m/s and rad/s."""
+_ZERO = 0.15
+"""A driver that begins anew gives poses this near to zero, metres and rad."""
 _MOST_READINGS = 4000
 
 
-def is_jump(first: Pose, second: Pose) -> bool:
-    """Tell whether no robot drove from one reading to the next: its odometry began anew."""
+def began_anew(first: Pose, second: Pose, seconds: float | None) -> bool:
+    """Tell whether no robot drove from one reading to the next: its odometry began anew.
+
+    Args:
+        first: A reading.
+        second: The next one.
+        seconds: The time between them by their stamps; None: not known. Readings may have been
+            lost in between, as on a busy network.
+    """
     dx, dy, turn = relative(first, second)
-    return math.hypot(dx, dy) > TOP_STEP or abs(turn) > TOP_TURN
+    way, turned = math.hypot(dx, dy), abs(turn)
+    if way <= _SMALL_STEP and turned <= _SMALL_TURN:
+        return False
+    if seconds is None or seconds < 0.0 or max(map(abs, second)) < _ZERO:
+        return True
+    return way > _SMALL_STEP + _TOP_SPEED * seconds or turned > _SMALL_TURN + _TOP_TURN * seconds
 
 
 class ContinuousOdometry:
     """Odometry that goes on where it was when its driver begins anew at 0."""
 
     def __init__(self) -> None:
-        self._last: Pose | None = None
-        self._begins: Pose = (0.0, 0.0, 0.0)
+        self._last: tuple[Pose, float | None] | None = None
+        self._pose: Pose = (0.0, 0.0, 0.0)
+        self._speed = (0.0, 0.0)
 
-    def take(self, reading: Pose) -> Pose:
+    def take(self, reading: Pose, stamp: float | None = None) -> Pose:
         """Return where a reading has the robot, in the frame in which the first reading was."""
-        last, self._last = self._last, reading
-        if last is not None and is_jump(last, reading):
-            before = composed(self._begins, last)
-            self._begins = composed(before, relative(reading, (0.0, 0.0, 0.0)))
-        return composed(self._begins, reading)
+        if self._last is None:
+            self._pose = reading
+        step, _ = self.step(reading, stamp)
+        self._pose = composed(self._pose, step)
+        return self._pose
+
+    def step(self, reading: Pose, stamp: float | None = None) -> tuple[Pose, tuple[float, float]]:
+        """Return how far the robot went since the reading before.
+
+        Args:
+            reading: In the odometry's own frame.
+            stamp: Its time, seconds; None: not known.
+
+        Returns:
+            The step, in the robot's frame; and how far it may have gone beside, metres and rad,
+            while the odometry that began anew said nothing.
+        """
+        last, self._last = self._last, (reading, stamp)
+        if last is None:
+            return (0.0, 0.0, 0.0), (0.0, 0.0)
+        before, then = last
+        seconds = None if stamp is None or then is None else stamp - then
+        if began_anew(before, reading, seconds):
+            silent = min(max(seconds or 0.0, 0.0), KEPT)
+            return (0.0, 0.0, 0.0), (silent * self._speed[0], silent * self._speed[1])
+        step = relative(before, reading)
+        if seconds is not None and seconds > 0.0:
+            self._speed = math.hypot(*step[:2]) / seconds, abs(step[2]) / seconds
+        return step, (0.0, 0.0)
 
 
 class OdometryBuffer:
@@ -70,7 +111,7 @@ class OdometryBuffer:
         if self._readings:
             last, before = self._readings[-1]
             step = stamp - last
-            if not -LATE < step < KEPT or is_jump(before, pose):
+            if not -LATE < step < KEPT or began_anew(before, pose, step):
                 self._readings.clear()
             elif step <= 0.0:
                 return
@@ -119,10 +160,19 @@ def joined(scan: Scan, odometry: OdometryBuffer, stamp: float) -> Scan:
         The same scan where the odometry of that time is not known. Its rays are in the order of
         their angles.
     """
+    known = joined_if_known(scan, odometry, stamp)
+    return scan if known is None else known
+
+
+def joined_if_known(scan: Scan, odometry: OdometryBuffer, stamp: float) -> Scan | None:
+    """Return a scan as `joined` does; None where the odometry of its time is not known.
+
+    A map that is built must not take such a scan for one of now: it would stay at a wrong pose.
+    """
     sweep = 0.0 if scan.times is None else float(scan.times.max(initial=0.0))
     latest = odometry.latest
     if latest is None or not odometry.covers(stamp, stamp + sweep):
-        return scan
+        return None
     now = latest[1]
     if scan.times is None or sweep == 0.0:
         x, y, yaw = odometry.at(np.array([stamp]))[0].tolist()
