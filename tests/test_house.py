@@ -22,9 +22,10 @@ LIBRARIES = {name for name, path in MODULES.items() if 'libs' in path.parts}
 
 DOUBLE_NAMES: dict[str, str] = {
     'ArmorClient': 'the known name: over any transport, over ROS, and as armor_py_api has it',
+    'Evidence': 'of an inequality, in the reasoner alone; of a scan, in localisation alone',
     'Kind': 'of an argument of a directive; of an observation',
     'Reasoner': 'what the machines need, and the node of that name behind it',
-    '_Waiting': '',
+    '_Waiting': 'private: a value that is to be written; a piece of work in a queue',
 }
 """Class names that several modules use, each with its reason to stay; empty: to be renamed."""
 LARGE_CLASSES = {
@@ -53,7 +54,6 @@ TO_BE_CUT = {
     'Exploration',
     'Explorer',
     'GridPlanner',
-    'Localiser',
     'NavigationMotion',
     'Navigator',
     'RoomInspection',
