@@ -305,7 +305,11 @@ def _lint(argv: list[str]) -> int:
     tests = ['mypy', '--config-file', 'tests/mypy.ini']
     # Each library's tests are modules of the same names: they are checked by themselves.
     libraries = [
-        [str(each.relative_to(CHECKOUT) / part) for part in ('tests', 'examples')]
+        [
+            str(each.relative_to(CHECKOUT) / part)
+            for part in ('tests', 'examples')
+            if (each / part).is_dir()
+        ]
         for each in sorted((CHECKOUT / 'libs').iterdir())
     ]
     code = 0
