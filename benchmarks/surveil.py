@@ -147,6 +147,8 @@ class Rounds:
             Rounds.rooms = PlaceRooms(world, Rounds.grid)
         self.lidar = LidarModel()
         self.pose_error = POSE_ERROR
+        # By what the pose is off for the whole of a visit, metres and rad.
+        self.bias = (0.0, 0.0, 0.0)
         self.time = datetime(2026, 3, 2, tzinfo=UTC).timestamp()
         self.book = EventBook()
         self.told: list[Observation] = []
@@ -190,8 +192,8 @@ class Rounds:
         met = np.isfinite(ranges)
         ranges = np.where(met, ranges, self.lidar.range_max)
         ex, ey = self.rng.normal(0.0, self.pose_error[0], 2)
-        told = yaw + self.rng.normal(0.0, self.pose_error[1])
-        sensor = x + ex, y + ey
+        told = yaw + self.rng.normal(0.0, self.pose_error[1]) + self.bias[2]
+        sensor = x + ex + self.bias[0], y + ey + self.bias[1]
         angles = self.lidar.angles + told
         ends = np.stack([np.cos(angles), np.sin(angles)], axis=1) * ranges[:, None] + sensor
         self.watcher.sweep(sensor, ends, met, self.time)
@@ -390,6 +392,58 @@ def free_point(rounds: Rounds, place: str, margin: float) -> tuple[float, float]
             continue
         if min(math.dist((x, y), each) for each in doors) > 1.3:
             return x, y
+
+
+def measure_biased_poses(trials: int) -> list[list[str]]:
+    """Visit a place whose pose is off by a constant for each visit; in a third nothing changes."""
+    rows = [
+        ['pose off', 'visits with a false thing, aim 0', 'appeared, aim 95 %', 'gone, aim 95 %']
+    ]
+    for metres, degrees in ((0.05, 0.3), (0.05, 1.0), (0.10, 1.0)):
+        false = 0
+        found = {'appeared': 0, 'removed': 0}
+        for trial in range(trials):
+            for change in ('nothing', 'appeared', 'removed'):
+                rounds = Rounds(7000 + trial)
+                rounds.pose_error = (0.005, math.radians(0.1))
+                place = ('R1', 'R2', 'R3', 'R4', 'C1', 'C2', 'E')[trial % 7]
+                rounds.at = rounds.world.plan.place.positions[place][:2]
+                point = free_point(rounds, place, 0.5)
+                thing = f'box it {point[0]} {point[1]} {rounds.rng.uniform(0.2, 0.4)} 0.5'
+                if change == 'removed':
+                    rounds.stage.do(thing, rounds.time)
+                told: list[Observation] = []
+                for visit in range(3):
+                    if visit == 2 and change == 'appeared':
+                        rounds.stage.do(thing, rounds.time)
+                    if visit == 2 and change == 'removed':
+                        rounds.stage.do('remove it', rounds.time)
+                    x, y = rounds.rng.normal(0.0, metres, 2)
+                    rounds.bias = x, y, math.radians(float(rounds.rng.normal(0.0, degrees)))
+                    told = [each for each in rounds.visit(place) if each.kind == Kind.OBJECT]
+                    rounds.watcher.arrive('elsewhere', rounds.time)
+                    rounds.place = ''
+                    rounds.time += 600.0
+                near = [
+                    each
+                    for each in told
+                    if change != 'nothing'
+                    and each.position is not None
+                    and math.dist(each.position, point) < 0.5
+                ]
+                if change == 'nothing':
+                    false += bool(told)
+                else:
+                    found[change] += any(each.state == change for each in near)
+        rows.append(
+            [
+                f'{100 * metres:.0f} cm, {degrees:g} degrees',
+                f'{false} of {trials}',
+                part(found['appeared'], trials),
+                part(found['removed'], trials),
+            ]
+        )
+    return rows
 
 
 def difference_of_scans(before: Any, now: Any) -> bool:
@@ -1350,6 +1404,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     names = (
         'doors',
         'things',
+        'poses',
         'markers',
         'persons',
         'views',
@@ -1367,6 +1422,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     measures: dict[str, Callable[[], list[list[str]]]] = {
         'doors': lambda: measure_doors(size.of(420, 12, 1)),
         'things': lambda: measure_things(size.of(70, 4, 1)),
+        'poses': lambda: measure_biased_poses(size.of(140, 4, 1)),
         'markers': lambda: measure_markers(size.of(options.trials, 4, 1)),
         'persons': lambda: measure_persons(size.of(60, 6, 1)),
         'views': lambda: measure_views(size.of(60, 8, 1)),

@@ -208,10 +208,10 @@ class Observer(PatrolNode):
             self._see(pose, scan)
 
     def _see(self, pose: Pose, scan: Scan) -> None:
-        sweep = sweep_of(pose, scan, self._now())
+        sweep, doubt = sweep_of(pose, scan, self._now()), self._doubt()
 
         def compare() -> None:
-            self.worker.monitor.sweep(*sweep)
+            self.worker.monitor.sweep(sweep.sensor, sweep.ends, sweep.met, sweep.stamp, doubt)
             self._lost.count('sweeps')
             self.sweeps += 1
             self.health.figure('sweeps', self.sweeps)

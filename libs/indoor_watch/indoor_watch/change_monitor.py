@@ -27,6 +27,7 @@ from indoor_watch.other_robots import OtherRobots
 from indoor_watch.person_monitor import PersonMonitor
 from indoor_watch.persons import Person, Picture
 from indoor_watch.reference_views import ReferenceViews, Viewpoint
+from indoor_watch.registration import Registration
 from indoor_watch.view_monitor import LightMonitor, ViewMonitor
 from indoor_watch.views import Sight, grey_of
 from indoor_watch.visit import CameraShot, Coverage, LidarSweep, Mask, Points, Rooms, Visit
@@ -106,6 +107,7 @@ class ChangeMonitor:
             drawn=self._floor.drawn,
             verify_seconds=verify_seconds,
         )
+        self._registration = Registration()
         self._latest = math.inf
         self.visit = Visit(rooms=rooms)
 
@@ -155,6 +157,7 @@ class ChangeMonitor:
                 self._alerting.end(gone, stamp)
         self._floor.learn(ended, self._current)
         self._persons.begin()
+        self._registration.begin()
         self.visit = ended.next(place, stamp)
 
     def _compare(self, stamp: float) -> None:
@@ -172,7 +175,14 @@ class ChangeMonitor:
         """Return what was in view since the robot came here."""
         return self.visit.coverage(self._floor.grid, stamp)
 
-    def sweep(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
+    def sweep(
+        self,
+        sensor: tuple[float, float],
+        ends: Points,
+        met: Mask,
+        stamp: float,
+        doubt: tuple[float, float] | None = None,
+    ) -> None:
         """Take a sweep of the lidar.
 
         Args:
@@ -180,13 +190,19 @@ class ChangeMonitor:
             ends: Where beams ended, (n, 2), same frame.
             met: Whether something was met there, (n,).
             stamp: Seconds since 1970.
+            doubt: Standard deviations of the pose, as the localisation says, metres and rad; None:
+                it does not tell.
         """
         self._heed_clock(stamp)
         apart = self._others.apart(ends, stamp)
         sweep, visit = LidarSweep(sensor, ends[apart], met[apart], stamp), self.visit
+        if self._floor.grid is not None:
+            sweep = self._registration.registered(
+                sweep, self._floor.grid, self._floor.normal, doubt
+            )
         visit.sweep = sweep
-        if visit.stood_at is None or math.dist(sensor, visit.stood_at) > ELSEWHERE:
-            visit.stood_at, visit.stood_since = sensor, stamp
+        if visit.stood_at is None or math.dist(sweep.sensor, visit.stood_at) > ELSEWHERE:
+            visit.stood_at, visit.stood_since = sweep.sensor, stamp
         self._floor.begin(visit)
         self._alerting.take(self._persons.take(sweep, visit, self._floor.normal), visit)
         self._floor.take(sweep, visit)

@@ -37,6 +37,8 @@ YAW_SLACK = 0.025
 """An error of the heading moves an end by this times its distance, rad: 2.5 times the 0.6 degrees
 that a localised robot is off. It has nothing to do with what `NEAR_WALL` allows for: as errors that
 do not depend on each other do, their squares add up."""
+DOUBTED = 2.5
+"""An end is the wall's within so many standard deviations of what is left of the pose's doubt."""
 NEAR_THING = 0.15
 """A thing so near to where one stood before is the same one, metres."""
 LEAST_EXTENT = 0.08
@@ -131,7 +133,14 @@ class FloorVisit:
         self._walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
         self.sweeps = 0
 
-    def add(self, sensor: tuple[float, float], ends: Points, met: Mask, stamp: float) -> None:
+    def add(
+        self,
+        sensor: tuple[float, float],
+        ends: Points,
+        met: Mask,
+        stamp: float,
+        doubt: Points | None = None,
+    ) -> None:
         """Take one sweep.
 
         Args:
@@ -139,6 +148,7 @@ class FloorVisit:
             ends: Where beams ended, (n, 2), same frame.
             met: Whether something was met there, (n,); False for a beam at its greatest range.
             stamp: Seconds.
+            doubt: By what each end may be off across what it met, (n,), metres; None: 0.
         """
         self.sweeps += 1
         origin = np.asarray(sensor, float)
@@ -146,10 +156,12 @@ class FloorVisit:
         lengths = np.linalg.norm(rays, axis=1)
         good = np.isfinite(lengths) & (lengths > 1e-3)
         rays, lengths, met = rays[good] / lengths[good, None], lengths[good], met[good]
+        doubt = None if doubt is None else doubt[good]
         ended = met & (lengths <= self._farthest)
         hits = origin + rays[ended] * lengths[ended, None]
         hit = self._cells(hits)
-        of_things = self._cells(hits[~self.of_wall(hits, lengths[ended])])
+        off = None if doubt is None else doubt[ended]
+        of_things = self._cells(hits[~self.of_wall(hits, lengths[ended], off)])
         # Every half cell along each beam, up to a cell and a half before its end.
         side = self._grid.resolution
         until = np.minimum(lengths, self._farthest) - np.where(ended, 1.5 * side, 0.0)
@@ -173,12 +185,20 @@ class FloorVisit:
         while not 0.0 <= stamp - self._lately[0][0] <= LEAVES:
             self._met_near += self._lately.popleft()[1]
 
-    def of_wall(self, hits: Points, lengths: NDArray[np.float64]) -> Mask:
-        """Tell of each end whether a wall of the map may be what was met, so far off, metres."""
+    def of_wall(self, hits: Points, lengths: Points, doubt: Points | None = None) -> Mask:
+        """Tell of each end whether a wall of the map may be what was met.
+
+        Args:
+            hits: The ends, (n, 2), map frame, metres.
+            lengths: How far from the lidar they are, (n,), metres.
+            doubt: By what each may be off across what it met, (n,), metres; None: 0.
+        """
         cells = self._grid.cells_of(hits)
         height, width = self._grid.cells.shape
         rows, columns = np.clip(cells[:, 0], 0, height - 1), np.clip(cells[:, 1], 0, width - 1)
         slack = np.hypot(NEAR_WALL, YAW_SLACK * lengths)
+        if doubt is not None:
+            slack = np.hypot(slack, DOUBTED * doubt)
         return np.asarray(self._walls[rows, columns] <= slack, np.bool_)
 
     def fresh(self, sensor: tuple[float, float], points: Points) -> Mask:

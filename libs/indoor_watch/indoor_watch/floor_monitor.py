@@ -80,7 +80,7 @@ class FloorMonitor:
     def take(self, sweep: LidarSweep, visit: Visit) -> None:
         """Take a sweep."""
         if visit.floor is not None:
-            visit.floor.add(sweep.sensor, sweep.ends, sweep.met, sweep.stamp)
+            visit.floor.add(sweep.sensor, sweep.ends, sweep.met, sweep.stamp, sweep.doubt)
 
     def compare(self, visit: Visit, stamp: float) -> list[Pictured]:
         """Return what of a visit so far differs from what is normal, in two comparisons."""

@@ -51,12 +51,15 @@ class LidarSweep(NamedTuple):
         ends: Where beams ended, (n, 2), same frame.
         met: Whether something was met there, (n,); False for a beam at its greatest range.
         stamp: Seconds since 1970.
+        doubt: By what each end may be off across what it met, standard deviation, (n,), metres;
+            None: that is not known.
     """
 
     sensor: tuple[float, float]
     ends: Points
     met: Mask
     stamp: float
+    doubt: Points | None = None
 
     @property
     def points(self) -> Points:
@@ -229,7 +232,8 @@ class Visit:
         if self.floor is None or not len(met):
             return met
         away = np.linalg.norm(met - np.asarray(self.sweep.sensor), axis=1)
-        return met[~self.floor.of_wall(met, away)]
+        doubt = None if self.sweep.doubt is None else self.sweep.doubt[self.sweep.met]
+        return met[~self.floor.of_wall(met, away, doubt)]
 
     def coverage(self, grid: Grid | None, stamp: float) -> Coverage:
         """Return what was in view until now, of a map; None: there is none."""
