@@ -49,6 +49,14 @@ _BESIDE_DOOR = 0.3
 """An opening is a known door if their middles are at most so far apart, metres."""
 
 
+_SEPARATE_ENOUGH = 2.0
+"""From this area on, in squares of the door's width, a room is one whatever stands at its door."""
+_DEEP = 0.75
+"""What is deeper than this beside a door, across it, is no wall, metres."""
+_LIFT = 2.0
+"""The smallest room behind a door, m^2: a lift for a wheelchair has 1.1 x 1.4 m and its walls."""
+_PASSES = 6
+_STEP = 0.05
 _PAPER = 0.6
 """Share of the map's edge from which on free floor there is outside, as that of a scanned plan."""
 _AT_EDGE = 0.02
@@ -159,6 +167,7 @@ def propose(
     free = grid.free
     clearance = distance_to(~free, grid.resolution)
     floor = _Floor(building, radius, known, scale, free, clearance, with_outside)
+    found = _without_false_doors(floor, found)
     for _ in range(found.rooms):
         layout = _laid_out(floor, found)
         pair = layout.one_room or _not_parted(floor, layout)
@@ -387,6 +396,58 @@ def _left_out(
         if (area := float(stats[piece, cv2.CC_STAT_AREA]) * cell) >= _DUST:
             left.append(part(0, pieces == piece, f'smaller than {SMALLEST_ROOM:g} m2', area))
     return tuple(left)
+
+
+def _without_false_doors(floor: _Floor, found: Segmentation) -> Segmentation:
+    """Return the rooms with those joined between which furniture stands, and no wall.
+
+    A cupboard beside a wall leaves a gap as wide as a door. What tells them apart: behind a door
+    there is a room, many times as large as a square on the door (`_SEPARATE_ENOUGH`), or what ends
+    at the door on both sides is as thin as a wall is (`_DEEP`). What is smaller than a lift
+    (`_LIFT`) is no room in either case. Closets and lifts behind doors in walls stay.
+    """
+    cell, grid = floor.scale**2, found.working
+    for _ in range(_PASSES):
+        areas = np.bincount(found.working_labels.ravel(), minlength=found.rooms + 1) * cell
+        needed = floor.radius + 1.5 * grid.resolution
+        widest: dict[int, tuple[float, tuple[int, int]]] = {}
+        for each in _openings(found.working_labels, floor.free, floor.clearance, needed + _SPARE):
+            if each.clearance <= needed:
+                continue
+            ends = (np.array([each.start, each.end, each.middle]) + 0.5) * floor.scale
+            line = _line(ends, floor.scale)
+            room = min(each.rooms, key=areas.__getitem__)
+            smaller = float(areas[room])
+            is_false = smaller < _LIFT or (
+                smaller < _SEPARATE_ENOUGH * line[3] ** 2
+                and max(_depth_at(floor, line, side) for side in (-1.0, 1.0)) > _DEEP
+            )
+            if is_false:
+                widest[room] = max(widest.get(room, (0.0, each.rooms)), (line[3], each.rooms))
+        if not widest:
+            break
+        # Each with one other, then all is looked at anew: it may be large enough now.
+        found = found.all_joined([pair for _, pair in widest.values()])
+    return found
+
+
+def _depth_at(floor: _Floor, door: list[float], side: float) -> float:
+    """Return how deep what stands beside a door is, across the door's direction, metres.
+
+    The least of four lines across it, which begin 0.1 to 0.4 m behind the jamb and reach 1 m to
+    both sides. The door is in the frame of the map's corner.
+    """
+    x, y, yaw, width = door
+    along, across = (math.cos(yaw), math.sin(yaw)), (-math.sin(yaw), math.cos(yaw))
+    behind = side * (width / 2 + np.array([0.1, 0.2, 0.3, 0.4]))[:, None]
+    beside = np.arange(-1.0, 1.0 + 1e-9, _STEP)[None, :]
+    columns = np.floor((x + behind * along[0] + beside * across[0]) / floor.scale).astype(int)
+    rows = np.floor((y + behind * along[1] + beside * across[1]) / floor.scale).astype(int)
+    inside = (rows >= 0) & (rows < floor.free.shape[0])
+    inside &= (columns >= 0) & (columns < floor.free.shape[1])
+    solid = np.ones(inside.shape, np.bool_)
+    solid[inside] = ~floor.free[rows[inside], columns[inside]]
+    return float(solid.sum(axis=1).min()) * _STEP
 
 
 def _not_parted(floor: _Floor, layout: _Layout) -> tuple[int, int] | None:
