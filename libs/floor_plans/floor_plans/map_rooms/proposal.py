@@ -273,18 +273,22 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     near = _beside(floor, [*lines, *walls])
     positions: dict[str, list[float]] = {}
     one_room = None
+    boxes = _boxes(labels)
     for number in sorted(rooms):
-        mask = labels == number
-        inside = mask & ~near
-        if len(rooms) > 1 and not (inside & reach).any():
+        box = boxes[number]  # a building has hundreds of rooms: each is looked at alone
+        mask = labels[box] == number
+        inside = mask & ~near[box]
+        if len(rooms) > 1 and not (inside & reach[box]).any():
             # So small that the lines of its doors fill it.
             beside = [each.rooms for each in ways if number in each.rooms]
             one_room = one_room or beside[0]
             inside = mask
-        cell = point_in(inside, reach, clearance, radius)
-        positions[names[number]] = _rounded(floor.world([cell])[0])
+        column, row = point_in(inside, reach[box], clearance[box], radius)
+        at = (column + box[1].start, row + box[0].start)
+        positions[names[number]] = _rounded(floor.world([at])[0])
     points = list(positions.values())
-    points += [floor.world([_widest(labels == number, clearance)])[0] for number in outside]
+    beyond = [_widest(labels, number, boxes[number], clearance) for number in outside]
+    points += [floor.world([at])[0] for at in beyond]
     walls += _gaps(floor, found, [*lines, *walls], points)
     station, home = _station(floor.building, labels, reach & ~near, rooms, names, positions, scale)
     parameters: dict[str, Any] = {
@@ -336,11 +340,21 @@ def outside_of(found: Segmentation) -> frozenset[int]:
     return outer if set(range(1, found.rooms + 1)) - outer else frozenset()
 
 
-def _widest(mask: Mask, clearance: NDArray[np.float32]) -> Point:
+def _boxes(labels: Labels) -> dict[int, tuple[slice, slice]]:
+    """Return the rows and columns that each number's cells lie in."""
+    from scipy import ndimage  # takes 0.2 s: most only show a place
+
+    found = ndimage.find_objects(labels)
+    return {number: (box[0], box[1]) for number, box in enumerate(found, start=1) if box}
+
+
+def _widest(
+    labels: Labels, number: int, box: tuple[slice, slice], clearance: NDArray[np.float32]
+) -> Point:
     """Return the cell of a part that is farthest from what stands there, column and row."""
-    cells = np.argwhere(mask)
-    row, column = cells[np.argmax(clearance[cells[:, 0], cells[:, 1]])]
-    return float(column), float(row)
+    cells = np.argwhere(labels[box] == number)
+    row, column = cells[np.argmax(clearance[box][cells[:, 0], cells[:, 1]])]
+    return float(column + box[1].start), float(row + box[0].start)
 
 
 def _left_out(
@@ -358,14 +372,17 @@ def _left_out(
     areas = np.bincount(labels.ravel(), minlength=found.rooms + 1) * cell
     needed = floor.radius + 1.5 * found.working.resolution
 
-    def part(number: int, mask: Mask, reason: str, area: float) -> LeftOut:
-        x, y = _rounded(floor.world([_widest(mask, clearance)])[0])
-        return LeftOut(number, reason, round(float(area), 2), (x, y))
+    boxes = _boxes(labels)
+
+    def part(number: int, reason: str) -> LeftOut:
+        x, y = _rounded(floor.world([_widest(labels, number, boxes[number], clearance)])[0])
+        return LeftOut(number, reason, round(float(areas[number]), 2), (x, y))
 
     others = sorted(set(range(1, found.rooms + 1)) - rooms - outside)
 
     def why(number: int) -> str:
-        if float(clearance[labels == number].max()) <= floor.radius:
+        box = boxes[number]
+        if float(clearance[box][labels[box] == number].max()) <= floor.radius:
             return f'too narrow for a robot {2 * floor.radius:g} m wide'
         # Rooms that lead into each other have their way in together.
         mine = {number}
@@ -387,14 +404,17 @@ def _left_out(
         from_outside = any(outside & set(each.rooms) for each in ways)
         return 'reached from outside alone' if from_outside else 'no door: walls all around'
 
-    left = [part(each, labels == each, OUTSIDE, areas[each]) for each in sorted(outside)]
-    left += [part(each, labels == each, why(each), areas[each]) for each in others]
+    left = [part(each, OUTSIDE) for each in sorted(outside)]
+    left += [part(each, why(each)) for each in others]
     pieces, stats = cv2.connectedComponentsWithStats(
         (floor.free & (labels == 0)).astype(np.uint8), connectivity=4
     )[1:3]
-    for piece in range(1, len(stats)):
-        if (area := float(stats[piece, cv2.CC_STAT_AREA]) * cell) >= _DUST:
-            left.append(part(0, pieces == piece, f'smaller than {SMALLEST_ROOM:g} m2', area))
+    for piece, (west, low, wide, high, cells) in enumerate(stats.tolist()):
+        if piece and cells * cell >= _DUST:
+            box = (slice(low, low + high), slice(west, west + wide))
+            at = _rounded(floor.world([_widest(pieces, piece, box, clearance)])[0])
+            reason = f'smaller than {SMALLEST_ROOM:g} m2'
+            left.append(LeftOut(0, reason, round(cells * cell, 2), (at[0], at[1])))
     return tuple(left)
 
 
