@@ -144,7 +144,7 @@ class Demo:
         middle = (x, y) if self.rooms.box is None else self.rooms.box[:2]
         return sweep_picture(self.rooms.grid, middle, (x, y), ends)
 
-    def _changed(self, event: Event) -> None:
+    def _changed(self, event: Event, _instead: Observation | None) -> None:
         self.tell(f'  event {event.words()}: {event.state}')
 
     def _seen(self, seen: Observation) -> None:

@@ -86,6 +86,21 @@ class Event:
         at = '' if self.position is None or self.subject else ' at {:.1f}, {:.1f}'
         return f'{self.number}: {seen.words()}{at.format(*(self.position or ()))}'
 
+    def ending(self, instead: Observation | None) -> str:
+        """Say what ended it, and what it was, as 'R3: door D3 is open again (was closed)'.
+
+        Args:
+            instead: What was seen instead; None: it was seen no more, or a person has answered.
+        """
+        where = f'{self.place}: ' if self.place else ''
+        if instead is not None:
+            said = instead.kind.words(instead.state, instead.subject)
+            return f'{where}{said} again (was {self.seen})'
+        said = self.kind.words(self.seen, self.subject)
+        if self.state == EventState.OVER:
+            return f'{where}it is seen no more that {said}'
+        return f'{where}{said}: a person calls it {self.state}'
+
     def to_json(self) -> dict[str, Any]:
         """Return it as plain values."""
         return asdict(self)
@@ -113,10 +128,15 @@ class EventBook:
 
     Args:
         most: How many are kept.
-        told: Called with each event that begins or changes its state.
+        told: Called with each event that begins or changes its state, and with what was seen
+            instead where that ended it, else None.
     """
 
-    def __init__(self, most: int = 2000, told: Callable[[Event], object] = lambda _: None) -> None:
+    def __init__(
+        self,
+        most: int = 2000,
+        told: Callable[[Event, Observation | None], object] = lambda _event, _instead: None,
+    ) -> None:
         self._most = most
         self._told = told
         self._events: dict[int, Event] = {}
@@ -300,10 +320,10 @@ class EventBook:
         numbers = sorted(number for some in self._current.values() for number in some)
         return [self._events[number] for number in numbers]
 
-    def _keep(self, event: Event) -> None:
+    def _keep(self, event: Event, instead: Observation | None = None) -> None:
         self._events[event.number] = event
         self._index(event)
-        self._told(event)
+        self._told(event, instead)
         while len(self._events) > self._most and self._over:
             severity, last, number = heapq.heappop(self._over)
             least = self._events.get(number)
@@ -348,7 +368,7 @@ class EventBook:
             if not _ends(each, seen) or seen.stamp <= each.last:
                 continue
             if each.state in _GOING_ON:
-                self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
+                self._keep(replace(each, state=EventState.OVER, last=seen.stamp), seen)
             self._quiet.discard(each.number)
             self._index(self._events[each.number])
 
