@@ -51,7 +51,7 @@ class Event:
         looks: In how many visits it was seen.
         confidence: That at least one of its sightings was right.
         robots: Who saw it.
-        evidence: Of the first and the last sighting.
+        evidence: Of the first sighting, the surest and the last one, as far as these differ.
         compared_with: What the last sighting was compared with; or empty.
         seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
         confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another visit,
@@ -147,6 +147,8 @@ class EventBook:
         self._normal: dict[_Key, list[Observation]] = {}
         self._next = 1
         self._visits: dict[int, int] = {}
+        # Of each event the surest sighting with a picture: how sure, and the picture.
+        self._surest: dict[int, tuple[float, str]] = {}
         self._quiet: set[int] = set()
 
     @property
@@ -202,11 +204,11 @@ class EventBook:
             )
             self._next += 1
             self._visits[event.number] = visit
+            self._surest[event.number] = seen.confidence, seen.evidence
             self._keep(event)
             return event
         new_visit = self._visits.get(event.number) != visit
         self._visits[event.number] = visit
-        first = event.evidence[:1]
         changed = replace(
             event,
             position=seen.position or event.position,
@@ -219,7 +221,7 @@ class EventBook:
             looks=event.looks + new_visit,
             confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
             robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
-            evidence=(*first, seen.evidence) if seen.evidence else event.evidence,
+            evidence=self._evidence(event, seen),
             compared_with=seen.compared_with or event.compared_with,
             confirmed=event.confirmed
             or seen.confidence >= SURE
@@ -231,6 +233,19 @@ class EventBook:
         if changed.state != EventState.OPEN:
             self._index(changed)
         return changed
+
+    def _evidence(self, event: Event, seen: Observation) -> tuple[str, ...]:
+        """Return the pictures of an event that are kept: the first, the surest, the last."""
+        if not seen.evidence:
+            return event.evidence
+        # After a restart it is not known how sure the first one was: it stays.
+        first = ''.join(event.evidence[:1])
+        sure, surest = self._surest.get(event.number, (1.0, first))
+        if seen.confidence > sure or not surest:
+            self._surest[event.number] = seen.confidence, seen.evidence
+            surest = seen.evidence
+        kept = (first, surest, seen.evidence)
+        return tuple(dict.fromkeys(each for each in kept if each))
 
     def answer(self, number: int, state: EventState) -> Event:
         """Take a person's word: acknowledged, normal from now on, or a false alarm.
@@ -309,7 +324,7 @@ class EventBook:
         self._normal, self._next = {}, following
         for each in normal:
             self._normal.setdefault(_key(each), []).append(each)
-        self._visits, self._quiet = {}, quiet
+        self._visits, self._surest, self._quiet = {}, {}, quiet
         self._current, self._over = {}, []
         for event in events:
             self._index(event)
@@ -335,6 +350,7 @@ class EventBook:
             del self._events[number]
             self._quiet.discard(number)
             self._visits.pop(number, None)
+            self._surest.pop(number, None)
             self._current.get(_key(least), set()).discard(number)
 
     def _index(self, event: Event) -> None:
