@@ -144,17 +144,17 @@ def single_calls(client: Any) -> dict[str, Callable[[], Any]]:
 
 def inside(rounds: int) -> list[Row]:
     """Return the service without ROS, without and with the store."""
-    from armor_service.store import Store
+    from armor_service.store.store import Store
 
     rows = _service_rows('in process', None, rounds)
     few = max(rounds // 10, 20)
-    for label, worlds in (('with store', True), ('with store, no World', False)):
+    for label, synced in (('with store', False), ('with store, synced', True)):
         with tempfile.TemporaryDirectory() as directory:
-            rows += _service_rows(label, Store(Path(directory)), few, worlds=worlds)
+            rows += _service_rows(label, Store(Path(directory), synced=synced), few)
     return rows
 
 
-def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) -> list[Row]:
+def _service_rows(label: str, store: Any, rounds: int) -> list[Row]:
     from armor_service.access import Settings
     from armor_service.client import ArmorClient, InProcessTransport
     from armor_service.service import ArmorService
@@ -163,7 +163,7 @@ def _service_rows(label: str, store: Any, rounds: int, *, worlds: bool = False) 
     from surveillance_ontology.patrol_vocabulary import DATA
     from surveillance_ontology.robot_ontology import RobotOntology
 
-    service = ArmorService(Settings(worlds=worlds), store=store)
+    service = ArmorService(Settings(), store=store)
     client = ArmorClient('benchmark', 'map', InProcessTransport(service))
     MapOntology(client).build(
         read_place(PLACE).place, str(DATA / 'surveillance.owl'), IRI, 2_000_000_000

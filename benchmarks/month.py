@@ -33,7 +33,7 @@ if str(ROOT) not in sys.path:
 from armor_service.access import Settings
 from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.service import ArmorService
-from armor_service.store import Store
+from armor_service.store.store import Store
 from benchmarks.sizes import sized_parser
 from floor_plans import read_place
 from surveillance_behaviour.mission import mission_log

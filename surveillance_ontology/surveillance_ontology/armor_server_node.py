@@ -22,7 +22,7 @@ from armor_service.access import Settings, state_folder
 from armor_service.changes import ChangeFeed, NumberedChange
 from armor_service.protocol import DirectiveRequest, DirectiveResponse, StoreError
 from armor_service.service import ArmorService
-from armor_service.store import Store
+from armor_service.store.store import Store
 from armor_service.turns import Backlog, Turns
 from state_machines.ros.waiting import executor_of, reported
 from surveillance_interfaces.msg import ArmorDirectiveRes, FactChanges
@@ -251,6 +251,14 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         'place has another store. Empty: one store for all.',
         read_only=True,
     )
+    durability = node.parameter(
+        'durability',
+        'process',
+        'What an answered change outlives: the end of the process, or a loss of power as well, for '
+        'which each answer waits for the disk.',
+        choices=('process', 'power'),
+        read_only=True,
+    )
     if not re.fullmatch(r'[\w-]*', place):
         raise ParameterError(
             f'{node.get_name()}: parameter place {place!r}: expected letters, digits, _ and -'
@@ -262,7 +270,8 @@ def _service(node: PatrolNode, keep: bool) -> ArmorService:
         told = f', beside {", ".join(sorted(others))}' if others else ''
         log.info(f'place {place}: it has a store of its own, which is new{told}')
     try:
-        store = None if stored in ('', 'none') else Store(folder)
+        synced = durability == 'power'
+        store = None if stored in ('', 'none') else Store(folder, synced=synced)
         service = ArmorService(settings, log.info, log.warn, store)
         if store:
             kept = ', '.join(service.workspace.references.names()) or 'empty'

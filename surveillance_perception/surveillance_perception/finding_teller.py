@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from indoor_watch import Event, EventState, Observation
+from indoor_watch import Event, EventState
 from strict_files.files import FileError
 from surveillance_runtime.event_log import EventLog, RecordEntry, read_all
 from surveillance_runtime.incidents import Cause, Incidents, SeenThing, Severity
@@ -52,13 +52,8 @@ class FindingTeller:
         self._looks: dict[int, int] = {}
         self._problem = ''
 
-    def changed(self, finding: Event, instead: Observation | None = None) -> None:
-        """Take a finding that has begun or changed its state.
-
-        Args:
-            finding: The finding.
-            instead: What was seen instead, where that ended it.
-        """
+    def changed(self, finding: Event) -> None:
+        """Take a finding that has begun or changed its state."""
         cause = cause_of(finding)
         if self._told.get(finding.number) != finding.state:
             self._told[finding.number] = finding.state
@@ -67,7 +62,7 @@ class FindingTeller:
         if finding.state == EventState.ACKNOWLEDGED:
             self._incidents.acknowledge(cause, PERSON)
         elif finding.state != EventState.OPEN:
-            self._incidents.end(cause, finding.ending(instead))
+            self._incidents.end(cause, finding.words())
 
     def alert(self, finding: Event) -> None:
         """Take that people are to be called for a finding, if they are not yet."""

@@ -11,7 +11,7 @@ from armor_service.changes import LARGE, ChangeFeed
 from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.facts import FactSet, ShortFact, parse_fact
 from armor_service.service import ArmorService
-from armor_service.store import decode, encode
+from armor_service.store.records import decode, encode
 from libs.armor_service.tests.seven_rooms import IRI, ONTOLOGY, asker, build_seven_rooms
 from surveillance_interfaces.msg import ArmorDirectiveRes
 from surveillance_ontology.conversions import (

@@ -7,11 +7,12 @@
 `ArmorClient` builds directives and reads answers over any transport. The node and the ROS transport
 stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology.armor_client`.
 
-Modules, from the bottom: `protocol` (requests, answers), `rendering` and `facts` (texts),
-`changes` (of an ontology), `quarantine`, `reference` and `registry` (loaded ontologies), `store`
-(what outlives the process), `worlds` (the same for owlready2), `names` (mistyped ones), `access`
-(limits and files), `workspace` (all of these: what directives act on), `directives` (what each
-does), `service` (dispatch and locks) and `client`.
+Begin with `python -m armor_service.demo`, then `service` and `directives.table`. Public is what
+this module lists, `facts` and `changes`; the rest may change. From the bottom: `protocol`
+(requests, answers), `rendering` and `facts` (texts), `changes` (of an ontology), `quarantine`,
+`reference` and `registry` (loaded ontologies), `store` (what outlives the process), `names`
+(mistyped ones), `access` (limits and files), `workspace` (all of these: what directives act on),
+`directives` (what each does), `service` (dispatch and locks) and `client`.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from armor_service.protocol import name_in as name_in
     from armor_service.protocol import value_in as value_in
     from armor_service.service import ArmorService as ArmorService
-    from armor_service.store import Store as Store
+    from armor_service.store.store import Store as Store
 
 _HOME = {
     'ArmorClient': 'client',
@@ -45,7 +46,7 @@ _HOME = {
     'ExitCode': 'protocol',
     'InProcessTransport': 'client',
     'Settings': 'access',
-    'Store': 'store',
+    'Store': 'store.store',
     'name_in': 'protocol',
     'value_in': 'protocol',
 }

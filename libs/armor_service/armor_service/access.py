@@ -17,6 +17,7 @@ from strict_files.settings import names_expected, parameter
 CODE = Path(__file__).resolve().parent.parent
 ONTOLOGY_ENDINGS = ('.nt', '.omn', '.owl', '.owx', '.rdf', '.ttl', '.xml')
 LOG_ENDINGS = ('.log', '.txt')
+WORLD_ENDINGS = ('.sqlite3',)
 MAX_PATH = 4096
 _CONTROL = re.compile(r'[\x00-\x1f\x7f]')
 
@@ -97,9 +98,6 @@ class Settings:
         1024, 'MiB by which the process may grow while it reasons.', 1, 1_000_000
     )
     sparql_rows: int = 100_000
-    worlds: bool = parameter(
-        True, 'Keep each reference in the store as a World of owlready2 as well, in worlds/.'
-    )
     max_file_bytes: int = 64 * 1024 * 1024
     max_arguments: int = 100_000
     max_characters: int = 16 * 1024 * 1024

@@ -157,6 +157,7 @@ class Reference:
         cancel: Set to end the reasoning that runs.
         revision: Counts what may have changed an answer, so that copies know when they are old.
         dropped: The name does not stand for it any more.
+        on_applied: Told which directives' changes were applied, before anybody reasons over them.
         on_reasoning: Told over which of the untested changes is reasoned, or `WHOLE`; and None at
             the end.
         on_completed: Told that the derived facts are up to date.
@@ -176,6 +177,7 @@ class Reference:
     revision: int = 0
     dropped: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
+    on_applied: Callable[[list[Told]], None] = lambda _: None
     on_reasoning: Callable[[int | None], None] = lambda _: None
     on_completed: Callable[[], None] = lambda: None
     on_taken_back: Callable[[list[str], list[Change]], None] = lambda *_: None
@@ -264,6 +266,17 @@ class Reference:
         self._derive(timeout)
         return self.quarantine.since(before)
 
+    def reason_at_once(self) -> None:
+        """Reason over what another program changed, whatever waits for REASON.
+
+        Raises:
+            TooHardError: It was ended.
+        """
+        if self.opened:
+            self._derive()
+        else:
+            self.open()
+
     def explain(self, fact: Axiom | None) -> Explanation | None:
         """Return why a fact holds (None: the contradiction), within the limits of reasoning.
 
@@ -295,6 +308,7 @@ class Reference:
         apply_all(self.kb, (change for one in told for change in one.changes))
         self.quarantine.untested += told
         self.revision += 1
+        self.on_applied(told)
         if not self.buffering.reasoner and not self.too_hard:
             self._derive()
 
@@ -312,7 +326,7 @@ class Reference:
             self.cancel.clear()
         begin = time.thread_time()
         try:
-            if self.quarantine.is_given_up:
+            if self.quarantine.is_given_up and timeout == math.inf:
                 self._take_back(self.quarantine.ends)
             else:
                 self._reason(WHOLE, timeout)
@@ -330,7 +344,7 @@ class Reference:
     def _reason(self, place: int, timeout: float = math.inf) -> None:
         """Reason once, within the limits; `place` says over which of the changes."""
         count = sum(len(told.changes) for told in self.quarantine.untested)
-        if self.effort.base == 0.0 or self.quarantine.origin:
+        if self.kb.starts_anew or self.effort.base == 0.0 or self.quarantine.origin:
             count = len(self.kb)
         seconds = min(timeout, self.effort.limits.of(self.effort.base, count))
         self.on_reasoning(place)
@@ -346,6 +360,10 @@ class Reference:
             TooHardError: It takes too long without them as well, or was cancelled; the changes stay
                 as they are.
         """
+        if not self.quarantine.untested:
+            # There is no change to blame: what was reasoned over before is nobody's to take back.
+            self.too_hard = problem
+            raise TooHardError(problem)
         try:
             lines, undo = self.quarantine.take_back(self.kb, self._reason, problem)
         except ReasoningBudgetError as error:

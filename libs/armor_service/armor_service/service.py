@@ -30,7 +30,7 @@ from armor_service.protocol import (
 from armor_service.quarantine import Told, TooHardError
 from armor_service.reference import Reference
 from armor_service.rendering import one_line, shown
-from armor_service.store import Store
+from armor_service.store.store import Store
 from armor_service.workspace import Watcher, Workspace
 
 LONG_ARGUMENTS = 1000
@@ -173,25 +173,25 @@ class ArmorService:
                 if directive.kind is Kind.QUERY:
                     response = directive.run(ref, *self._values(directive, request, ref))
                 else:
-                    remark = self._change(directive, request, ref)
+                    if self._store:
+                        self._store.check(ref.name)
+                        self._store.take_in(ref)
+                    try:
+                        remark = self._change(directive, request, ref)
+                    finally:
+                        self.workspace.commit(ref)
                     response = DirectiveResponse(error_description=remark)
-        if self._store and directive.kind.may_reason:
-            self._store.compact_if_large(self._references.held_briefly)
         return response
 
     def _change(self, directive: Directive, request: DirectiveRequest, ref: Reference) -> str:
         """Carry out a manipulation; return what a client should know of it."""
         self.workspace.check_free(ref, request.client_name)
         if directive.kind is Kind.CONTROL:
-            if self._store and ref.buffering.waiting:
-                self._store.flushed(ref.name)
             remark: str = directive.run(ref, *self._values(directive, request, ref))
             return remark
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
         doubts = self._doubts(request, ref, changes)
         told = Told(request.client_name, self._clock(), tuple(changes))
-        if self._store and changes:
-            self._store.changed(ref.name, told)
         ref.effort.heavy |= directive.schema
         remark = '; '.join(filter(None, (ref.missing(changes), *doubts)))
         if not changes:

@@ -20,8 +20,7 @@ from armor_service.reference import Limits, Reference
 from armor_service.registry import Registry
 from armor_service.rendering import one_line
 from armor_service.sparql import SparqlEngine
-from armor_service.store import Store
-from armor_service.worlds import Worlds
+from armor_service.store.store import Store
 from owl_reasoner import gc_control
 from owl_reasoner.notifier import Changes
 
@@ -49,7 +48,6 @@ class Workspace:
         references: What is loaded.
         entering: Held while what was loaded gets its name.
         store: Makes references durable; None: they end with the process.
-        worlds: Writes them for programs that use owlready2; None: nobody does.
         states: Numbers the states that are taken to be saved.
         saved: The newest state that each file holds.
         limits: What reasoning over changes may use.
@@ -70,7 +68,6 @@ class Workspace:
         self.references = Registry()
         self.entering = threading.Lock()
         self.store = store
-        self.worlds: Worlds | None = None
         self.states = itertools.count(1)
         self.saved: dict[Path, int] = {}
         self._saving: dict[Path, threading.Lock] = {}
@@ -80,15 +77,11 @@ class Workspace:
         self._watchers: list[Watcher] = [self.sparql.note]
         if store:
             store.warn = self.warn
-            if self.settings.worlds:
-                self.worlds = Worlds(store.directory / 'worlds', self.warn)
             with gc_control.uncollected():
                 recovered = store.recover()
                 for ref in recovered:
                     self.register(ref)
                     gc_control.settle(len(ref.kb))
-            if self.worlds:
-                self.worlds.keep_only(self.references.names())
             for note in store.notes:
                 warn(note)
             threading.Thread(
@@ -128,8 +121,6 @@ class Workspace:
 
         ref.effort.limits, ref.on_taken_back = self.limits, on_taken_back
         ref.kb.subscribe(on_changes)
-        if self.worlds:
-            self.worlds.follow(ref)
         self.references.add(ref)
         self.tell(ref.name, None)
 
@@ -142,6 +133,16 @@ class Workspace:
             with ref.lock, gc_control.uncollected(), contextlib.suppress(StoreError):
                 if not ref.dropped:
                     ref.open()
+                    self.commit(ref)
+
+    def commit(self, ref: Reference) -> None:
+        """Keep what changed in a reference; call it under its lock.
+
+        Raises:
+            StoreError: The store is closed.
+        """
+        if self.store:
+            self.store.commit(ref)
 
     def saving(self, path: Path) -> threading.Lock:
         """Return what is held while a state is written to a file."""
@@ -165,8 +166,6 @@ class Workspace:
         for name in self.references.names():
             if (ref := self.references.get(name)) is not None:
                 ref.cancel.set()
-        if self.worlds:
-            self.worlds.close()
         if self.store:
             self.store.close()
         self.log.close()

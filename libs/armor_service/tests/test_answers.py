@@ -16,7 +16,7 @@ from armor_service.directives.table import TABLE
 from armor_service.protocol import DirectiveRequest, StoreError
 from armor_service.quarantine import TooHardError
 from armor_service.service import LARGE, LONG_ARGUMENTS, ArmorService
-from armor_service.store import Store
+from armor_service.store.store import Store
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.owl.axioms import ClassAssertion, EquivalentClasses
 from owl_reasoner.owl.expressions import ObjectMaxCardinality
@@ -94,7 +94,7 @@ def test_a_batch_that_could_not_be_kept_is_told_as_lost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(tmp_path / 'store')
-    service = ArmorService(Settings(tmp_path, worlds=False), print, print, store)
+    service = ArmorService(Settings(tmp_path), print, print, store)
     asker(service)(*LOAD, 'false', '', 'false')
     closing_one = DirectiveRequest('c', 'map', 'ADD', 'IND', '', ('x',))
     execute = service.execute
@@ -114,9 +114,7 @@ def test_a_batch_that_could_not_be_kept_is_told_as_lost(
 
 
 def test_sizes_at_the_bound_and_one_beyond() -> None:
-    service = ArmorService(
-        Settings(max_arguments=10, max_characters=1000, max_batch=3, worlds=False)
-    )
+    service = ArmorService(Settings(max_arguments=10, max_characters=1000, max_batch=3))
     ask = asker(service)
     ask(*LOAD, 'false', '', 'false')
     assert ask('DISJOINT IND', *'abcdefghij').success
@@ -176,9 +174,7 @@ def test_what_is_quick_is_done_at_once_and_all_else_is_left(
 
 
 def test_a_durable_service_writes_on_a_thread_that_may_block(tmp_path: Path) -> None:
-    service = ArmorService(
-        Settings(tmp_path, worlds=False), print, print, Store(tmp_path / 'store')
-    )
+    service = ArmorService(Settings(tmp_path), print, print, Store(tmp_path / 'store'))
     asker(service)(*LOAD, 'false', '', 'false')
     assert service.execute_at_once(request('ADD IND', 'x')) is None
     assert service.execute_at_once(request('QUERY IND', 'x')) is not None

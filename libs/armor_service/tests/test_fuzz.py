@@ -19,7 +19,7 @@ from armor_service.access import Settings
 from armor_service.directives.table import TABLE
 from armor_service.protocol import DirectiveRequest, DirectiveResponse
 from armor_service.service import ArmorService
-from armor_service.store import Store
+from armor_service.store.store import Store
 
 from .seven_rooms import FIXTURES
 
@@ -99,7 +99,7 @@ class Directives(RuleBasedStateMachine):
         self.start()
 
     def start(self) -> None:
-        store = Store(self.directory / 'store', compact_from=5000)
+        store = Store(self.directory / 'store')
         limits = Settings(ontologies_folder=self.directory, read_only_directories=(FIXTURES,))
         self.service = ArmorService(limits, lambda _: None, self.no_internal_error, store)
 

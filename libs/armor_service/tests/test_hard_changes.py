@@ -12,7 +12,7 @@ import pytest
 
 from armor_service.access import Settings
 from armor_service.service import ArmorService
-from armor_service.store import Store
+from armor_service.store.store import Store
 
 from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
 
@@ -61,7 +61,7 @@ class Served:
         self.ask('LOAD FILE', ONTOLOGY, IRI, 'false', '', 'false')
 
     def start(self) -> None:
-        settings = Settings(self._folder, reasoning_timeout=0.1, reasoning_memory=200, worlds=False)
+        settings = Settings(self._folder, reasoning_timeout=0.1, reasoning_memory=200)
         self.service = ArmorService(
             settings, print, self.notes.append, Store(self._folder / 'store')
         )

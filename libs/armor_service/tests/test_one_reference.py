@@ -518,3 +518,31 @@ def test_one_that_is_in_use_for_a_moment_is_waited_for() -> None:
     finally:
         waited_for.set()
         user.join()
+
+
+def test_what_is_too_hard_without_any_change_stays_as_it_is() -> None:
+    ref, kb = made(fact('a'), opened=False)
+    kb.change([fact('b')])
+    kb.fails = [ReasoningBudgetError('seconds', 'it takes too long')]
+    ref.open()
+    assert set(kb.axioms()) == {fact('a'), fact('b')}
+    assert ref.too_hard == 'it takes too long'
+    assert ref.reason() == ''
+    assert ref.too_hard == ''
+    # Nor where the process ended over it.
+    ref, kb = made(fact('a'))
+    kb.change([fact('b')])
+    ref.quarantine.deaths = 2
+    with pytest.raises(TooHardError, match='the process ended 2 times'):
+        ref.reason()
+    assert set(kb.axioms()) == {fact('a'), fact('b')}
+    assert ref.reason(5.0) == ''
+    assert ref.quarantine.deaths == 0
+
+
+def test_the_first_reasoning_of_a_process_has_the_time_of_all_axioms() -> None:
+    kb = Hard(fact(f'n{number}') for number in range(10))
+    limits = Limits(1.0, 5.0)
+    ref = Reference('map', kb, Origin('', ''), effort=Effort(limits, base=2.0), opened=False)
+    ref.open()
+    assert kb.asked == [(pytest.approx(1.0 + 40.0 + 10 * 0.0002), 5.0)]

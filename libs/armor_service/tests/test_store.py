@@ -2,54 +2,57 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import random
+import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from armor_service import registry as registry_module
-from armor_service import store as store_module
 from armor_service.access import Settings
 from armor_service.changes import AddAxiom, RemoveEntity, RenameEntity
 from armor_service.protocol import DirectiveRequest, StoreError
 from armor_service.quarantine import Quarantine, Told
-from armor_service.reference import Buffering, Effort, Origin, Reference
+from armor_service.reference import Buffering, Origin, Reference
 from armor_service.service import ArmorService
-from armor_service.store import Journal, Store, decode, encode
+from armor_service.store import store as store_module
+from armor_service.store.records import decode, encode
+from armor_service.store.spill import Spill
+from armor_service.store.store import Store, file_stem
+from armor_service.store.world_file import WorldFile
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import ClassAssertion
 
-from .seven_rooms import IRI, ONTOLOGY, Ask, asker, names
+from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker, names
 
+OLD = 'http://example.org/old'
 LOAD = ('LOAD FILE', ONTOLOGY, IRI)
 
 
 class Server:
     """A service with a store, which can be restarted without a goodbye."""
 
-    def __init__(self, directory: Path, compact_from: int = 1 << 20) -> None:
-        self._directory = directory
-        self._compact_from = compact_from
+    def __init__(self, directory: Path, *, synced: bool = False) -> None:
+        self.directory = directory
         self._files = directory.parent / 'files'
         self._files.mkdir(exist_ok=True)
+        self._synced = synced
         self.notes: list[str] = []
         self.written = threading.Event()
         self.start()
 
     def start(self) -> None:
-        store = Store(self._directory, self._compact_from)
         settings = Settings(ontologies_folder=self._files)
-        self.service = ArmorService(settings, print, self._note, store)
+        self.store = Store(self.directory, synced=self._synced)
+        self.service = ArmorService(settings, print, self._note, self.store)
         self.ask: Ask = asker(self.service)
 
     def _note(self, text: str) -> None:
@@ -60,6 +63,10 @@ class Server:
     def restart(self) -> None:
         self.service.close()
         self.start()
+
+    @property
+    def path(self) -> Path:
+        return self.store.path('map')
 
 
 @pytest.fixture
@@ -142,6 +149,10 @@ def full(*_: object) -> None:
     raise OSError(28, 'No space left on device')
 
 
+def full_file(*_: object) -> None:
+    raise sqlite3.OperationalError('database or disk is full')
+
+
 def door(name: str) -> DirectiveRequest:
     return DirectiveRequest('c', 'map', 'ADD', 'IND', 'CLASS', (name, 'DOOR'))
 
@@ -149,10 +160,10 @@ def door(name: str) -> DirectiveRequest:
 def test_a_full_disk_takes_no_knowledge_and_is_caught_up_with(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(store_module, 'RETRY_SECONDS', 0.01)
     load = (ONTOLOGY, IRI, 'false', '', 'false')
     with monkeypatch.context() as patch:
-        patch.setattr(os, 'fdatasync', full)
+        patch.setattr(WorldFile, '_committed', full_file)
+        patch.setattr(Spill, 'append', full)
         answer = server.service.execute_list([door(name) for name in 'ABC'])
         assert server.ask('ADD IND CLASS', 'D', 'DOOR').success
         lifecycle = [
@@ -166,8 +177,8 @@ def test_a_full_disk_takes_no_knowledge_and_is_caught_up_with(
     assert [each.success for each in answer.responses] == [True] * 3
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C', 'D']
     assert server.written.wait(60.0)
-    assert [note.partition('store: ')[2] for note in server.notes] == [
-        'No space left on device: until it can be written, changes are lost at a restart',
+    assert [note.partition('.sqlite3: ')[2] for note in server.notes if 'map.' in note] == [
+        'database or disk is full: until it can be written, changes are lost at a restart',
         'can be written again, every change is kept',
     ]
     server.ask('ADD IND CLASS', 'E', 'DOOR')
@@ -176,19 +187,41 @@ def test_a_full_disk_takes_no_knowledge_and_is_caught_up_with(
     assert server.ask('GET ALL REFS').queried_objects == ['map']
 
 
+def test_a_file_that_may_not_grow_gives_its_changes_to_the_spill(server: Server) -> None:
+    db = server.store._files['map']._db
+    assert db is not None
+    (pages,) = db.execute('PRAGMA page_count').fetchone()
+    db.execute(f'PRAGMA max_page_count = {pages}')
+    for number in range(400):
+        assert server.ask('ADD IND CLASS', f'a_door_with_a_long_name_{number}', 'DOOR').success
+    assert [note for note in server.notes if 'changes are kept in map.spill' in note]
+    # Like a SIGKILL: the files as they are at one moment.
+    ref = server.service.workspace.references.get('map')
+    assert ref is not None
+    with ref.lock:
+        shutil.copytree(server.directory, server.directory.with_name('copy'))
+    again = Server(server.directory.with_name('copy'))
+    assert len(names(again.ask('QUERY IND CLASS', 'DOOR'))) == 400
+    again.restart()
+    assert len(names(again.ask('QUERY IND CLASS', 'DOOR'))) == 400
+    assert not list(again.path.parent.glob('*.spill'))
+
+
 def test_what_cannot_be_written_is_there_as_a_whole_or_not_at_all(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server.ask('ADD IND CLASS', 'A', 'DOOR')
     with monkeypatch.context() as patch:
-        patch.setattr(os, 'fdatasync', full)
+        patch.setattr(WorldFile, '_committed', full_file)
+        patch.setattr(Spill, 'append', full)
         server.service.execute_list([door('B'), door('C')])
         server.service.close()
         assert server.notes[-1].endswith('2 changes are not kept')
     server.start()
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A']
     with monkeypatch.context() as patch:
-        patch.setattr(os, 'fdatasync', full)
+        patch.setattr(WorldFile, '_committed', full_file)
+        patch.setattr(Spill, 'append', full)
         server.service.execute_list([door('B'), door('C')])
     server.restart()
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
@@ -200,7 +233,8 @@ def test_changes_are_refused_one_by_one_where_too_many_wait(
     monkeypatch.setattr(store_module, 'MOST_WAITING', 1)
     query = DirectiveRequest('c', 'map', 'QUERY', 'IND', 'CLASS', ('DOOR',))
     with monkeypatch.context() as patch:
-        patch.setattr(os, 'fdatasync', full)
+        patch.setattr(WorldFile, '_committed', full_file)
+        patch.setattr(Spill, 'append', full)
         server.service.execute_list([door('A'), door('B')])
         answers = server.service.execute_list([door('C'), query]).responses
     assert not answers[0].success
@@ -209,237 +243,134 @@ def test_changes_are_refused_one_by_one_where_too_many_wait(
     assert names(answers[1]) == ['A', 'B']
 
 
-def test_snapshots_keep_the_journal_short(tmp_path: Path) -> None:
-    server = Server(tmp_path / 'store', compact_from=2000)
-    server.ask(*LOAD, 'false', '', 'true')
-    for number in range(200):
-        server.ask('REPLACE DATAPROP IND', 'now', 'Robot1', 'LONG', str(number + 1), str(number))
-    server.ask('ADD IND CLASS', 'X', 'DOOR')
-    server.restart()
-    size = sum(path.stat().st_size for path in (tmp_path / 'store').iterdir())
-    assert size < 30_000, 'without snapshots it would be twice as much'
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
-    assert '"200"^^xsd:long' in server.ask('QUERY DATAPROP IND', 'now', 'Robot1').queried_objects
-    assert server.notes == []
-
-
-def test_one_snapshot_is_written_at_a_time(tmp_path: Path) -> None:
-    store = Store(tmp_path / 'store', compact_from=0)
-    entered: list[str] = []
-    failures: list[str] = []
-    store.warn = failures.append
-    asked, may_go = threading.Barrier(9), threading.Event()
-
-    @contextmanager
-    def hold_all() -> Iterator[list[Reference]]:
-        entered.append(threading.current_thread().name)
-        assert may_go.wait(60.0)
-        yield []
-
-    def ask() -> None:
-        asked.wait(60.0)
-        store.compact_if_large(hold_all)
-
-    callers = [threading.Thread(target=ask) for _ in range(8)]
-    for caller in callers:
-        caller.start()
-    asked.wait(60.0)
-    for caller in callers:
-        caller.join(60.0)
-    may_go.set()
-    store.close()
-    assert (len(entered), failures) == (1, [])
-
-
-def test_a_snapshot_waits_for_an_ontology_in_use_and_holds_no_other_meanwhile(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(registry_module, 'UNUSED_WITHIN', 60.0)
-    server = Server(tmp_path / 'store', compact_from=1)
-    server.ask(*LOAD, 'false', '', 'false')
-    server.ask(*LOAD, 'false', '', 'false', reference='used')
-    used = server.service.workspace.references.find('used')
-    with used.lock:
-        answers: list[bool] = []
-
-        def ask_twice() -> None:
-            answers.extend(server.ask('ADD IND CLASS', name, 'DOOR').success for name in 'XY')
-
-        asking = threading.Thread(target=ask_twice)
-        asking.start()
-        asking.join(60.0)
-        assert answers == [True, True]
-    server.restart()
-    assert list((tmp_path / 'store').glob('snapshot-*'))
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
-
-
-def test_references_that_come_and_go_while_a_snapshot_begins_are_not_mistaken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    server = Server(tmp_path / 'store', compact_from=1)
-    server.ask(*LOAD, 'false', '', 'false')
-    server.ask(*LOAD, 'false', '', 'false', reference='early')
-    registry = server.service.workspace.references
-    held = registry.held_briefly
-
-    def held_late() -> AbstractContextManager[list[Reference]]:
-        server.ask(*LOAD, 'false', '', 'false', reference='late')
-        server.ask('DROP', reference='early')
-        return held()
-
-    monkeypatch.setattr(registry, 'held_briefly', held_late)
-    server.ask('ADD IND CLASS', 'X', 'DOOR')
-    server.restart()
-    assert server.ask('GET ALL REFS').queried_objects == ['late', 'map']
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X']
-    server.ask('ADD IND CLASS', 'Y', 'DOOR')
-    server.restart()
-    assert list((tmp_path / 'store').glob('snapshot-*')), 'the next change tries again'
-    assert server.ask('GET ALL REFS').queried_objects == ['late', 'map']
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['X', 'Y']
-
-
-def test_a_closed_journal_is_free_although_a_process_that_just_starts_holds_its_files(
-    tmp_path: Path,
-) -> None:
-    journal = Journal(tmp_path / 'store')
-    inherited = os.dup(journal._lock.fileno())  # as between fork and exec
-    journal.close()
-    Journal(tmp_path / 'store').close()
-    os.close(inherited)
-
-
-@pytest.mark.parametrize('left', [0, 5])
-def test_a_journal_that_somebody_cut_costs_nothing_that_is_known(tmp_path: Path, left: int) -> None:
-    journal = Journal(tmp_path)
-    journal.append([['a', 1]])
-    os.truncate(tmp_path / 'journal-0.log', left)
-    journal.append([['b', 2]])
-    journal.append([['c', 3]])
-    assert journal.is_incomplete
-    journal.close()
-    journal = Journal(tmp_path)
-    assert journal.records() == [['b', 2], ['c', 3]]
-    assert len(journal.notes) == 1
-    journal.close()
-
-
-def test_a_failed_write_after_a_cut_takes_no_record_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(*_: object) -> None:
-        raise OSError(5, 'Input/output error')
-
-    whole, cut = Journal(tmp_path / 'whole'), Journal(tmp_path / 'cut')
-    for journal in (whole, cut):
-        journal.append([['a', 1]])
-    os.truncate(tmp_path / 'cut' / 'journal-0.log', 5)
-    for journal in (whole, cut):
-        journal.append([['b', 2]])
-        with monkeypatch.context() as patch:
-            patch.setattr(os, 'fdatasync', broken)
-            with pytest.raises(StoreError, match='Input/output error'):
-                journal.append([['x', 0]])
-        journal.append([['c', 3]])
-        journal.close()
-    # Each record is where it would be had nobody cut the file.
-    sizes = {(tmp_path / name / 'journal-0.log').stat().st_size for name in ('whole', 'cut')}
-    assert len(sizes) == 1
-    journal = Journal(tmp_path / 'cut')
-    assert journal.records() == [['b', 2], ['c', 3]]
-    journal.close()
-
-
-def test_what_was_cut_from_the_journal_is_in_a_snapshot(server: Server) -> None:
+def test_a_folder_that_was_taken_away_is_written_again(server: Server) -> None:
     server.ask('ADD IND CLASS', 'A', 'DOOR')
-    store = server.service.workspace.store
-    assert store is not None
-    os.truncate(store.directory / 'journal-0.log', 0)
+    for path in server.path.parent.iterdir():
+        path.unlink()
     server.ask('ADD IND CLASS', 'B', 'DOOR')
-    snapshot = store._snapshot
-    assert snapshot is not None
-    snapshot.join(60.0)
-    assert server.notes[-1].endswith('the journal was cut; all that is known is written again')
-    server.ask('ADD IND CLASS', 'C', 'DOOR')
+    assert [note for note in server.notes if 'is no longer there' in note]
     server.restart()
-    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B']
 
 
-def test_a_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / 'store')
-    journal.append([['more', 'map', []]])
-    journal.close()
-    with pytest.raises(StoreError, match=r'cannot be read: unknown kind .more.'):
-        Server(tmp_path / 'store')
-
-
-def test_changes_of_a_reference_that_is_lost_are_left_out_with_one_line(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / 'store')
-    journal.append([['change', 'nowhere', []]])
-    journal.append([['mount', 'nowhere', 'a']])
-    journal.close()
-    server = Server(tmp_path / 'store')
-    assert server.ask('GET ALL REFS').queried_objects == []
-    (note,) = server.notes
-    assert '2 changes of references that are not there' in note
-
-
-def test_damage_costs_what_was_damaged_and_no_more(tmp_path: Path) -> None:
-    server = Server(tmp_path / 'store')
-    server.ask(*LOAD, 'false', '', 'true')
-    for number in range(20):
-        server.ask('ADD IND CLASS', f'X{number}', 'DOOR')
+def test_only_one_service_has_a_folder(server: Server) -> None:
+    with pytest.raises(StoreError, match='in use by another process'):
+        Store(server.directory)
     server.service.close()
-    (path,) = (tmp_path / 'store').glob('journal-*.log')
-    whole = path.read_bytes()
-    header = whole.index(b'\n')
-    seed = random.Random(3)
-    for byte in [10, header // 2, *(seed.randrange(len(whole)) for _ in range(20))]:
-        data = bytearray(whole)
-        data[byte] ^= 1 << seed.randrange(8)
-        path.write_bytes(data)
-        server.notes.clear()
+    Store(server.directory).close()
+
+
+@pytest.mark.parametrize(
+    ('content', 'words'),
+    [
+        (b'no database at all' * 100, 'file is not a database; put aside in damaged-'),
+        (b'SQLite format 3\x00' + b'\x00' * 4000, 'put aside in damaged-'),
+    ],
+)
+def test_a_file_that_is_no_database_is_put_aside(
+    server: Server, content: bytes, words: str
+) -> None:
+    server.service.close()
+    path = server.path
+    path.write_bytes(content)
+    server.start()
+    assert [note for note in server.notes if words in note], server.notes
+    assert server.ask('GET ALL REFS').queried_objects == []
+    assert list(path.parent.glob('damaged-*'))
+    assert server.ask(*LOAD, 'false', 'PELLET', 'false').success
+
+
+@pytest.mark.parametrize(
+    ('tables', 'words', 'least'),
+    [
+        (('objs',), 'statements were saved; nothing is lost', 600),
+        (('objs', 'index_objs_op'), 'statements were saved; of 1 tables some may be lost', 200),
+        (('index_objs_op',), '', 600),
+    ],
+)
+def test_of_a_damaged_file_what_can_be_read_is_kept(
+    server: Server, tables: tuple[str, ...], words: str, least: int
+) -> None:
+    for number in range(600):
+        server.ask('ADD IND CLASS', f'D{number}', 'DOOR')
+    server.service.close()
+    path = server.path
+    data = bytearray(path.read_bytes())
+    with closing(sqlite3.connect(path)) as db:
+        for table in tables:
+            query = 'SELECT pageno FROM dbstat WHERE name=? AND pagetype=?'
+            pages = [page for (page,) in db.execute(query, (table, 'leaf'))]
+            middle = pages[len(pages) // 2]
+            data[(middle - 1) * 4096 : middle * 4096] = b'\xff' * 4096
+    path.write_bytes(bytes(data))
+    server.start()
+    assert not words or [note for note in server.notes if words in note], server.notes
+    kept = names(server.ask('QUERY IND CLASS', 'DOOR'))
+    assert least <= len(kept) <= 600
+    assert server.ask('ADD IND CLASS', 'last', 'DOOR').success
+    assert not words or [note for note in server.notes if 'put aside in damaged-' in note]
+    assert all('\n' not in note for note in server.notes)
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == sorted([*kept, 'last'])
+
+
+def test_a_world_of_another_version_is_refused_with_one_line(server: Server) -> None:
+    server.service.close()
+    with closing(sqlite3.connect(server.path)) as db:
+        db.execute('UPDATE store SET version=13')
+        db.commit()
+    with pytest.raises(StoreError, match='of version 13 of owlready2, expected 12'):
         server.start()
-        doors = names(server.ask('QUERY IND CLASS', 'DOOR'))
-        assert len(server.notes) <= 1, 'one line'
-        assert len(doors) >= 19, byte
-        server.service.close()
+
+
+def test_a_copy_is_whole_while_the_service_runs(server: Server, tmp_path: Path) -> None:
+    server.ask('ADD IND CLASS', 'A', 'DOOR')
+    assert server.ask('BACKUP', 'copy.sqlite3').success
+    server.ask('ADD IND CLASS', 'B', 'DOOR')
+    copied = tmp_path / 'files' / 'copy.sqlite3'
+    server.service.close()
+    shutil.copyfile(copied, server.path)
+    server.start()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A']
+    refused = server.ask('BACKUP', 'copy.owl')
+    assert 'expected a name that ends in .sqlite3' in refused.error_description
 
 
 WRITER = """
 import sys
 from pathlib import Path
+from armor_service.access import Settings
 from armor_service.protocol import DirectiveRequest
 from armor_service.service import ArmorService
-from armor_service.store import Store
+from armor_service.store.store import Store
 
-service = ArmorService(store=Store(Path(sys.argv[1]), compact_from=3000))
+service = ArmorService(Settings(), print, lambda _: None, Store(Path(sys.argv[1])))
 number = int(sys.argv[2])
 while True:
     number += 1
-    what = 'ADD' if number % 3 else 'REMOVE'
-    args = (f'X{number if number % 3 else number - 1}', 'DOOR')
-    request = DirectiveRequest('c', 'map', what, 'IND', 'CLASS', args)
+    words = ('ADD', f'D{number}') if number % 5 else ('REMOVE', f'D{number - 1}')
+    request = DirectiveRequest('w', 'map', words[0], 'IND', 'CLASS', (words[1], 'DOOR'))
     assert service.execute(request).success
-    sys.stdout.write(f'{number}\\n')
-    sys.stdout.flush()
+    print(number, flush=True)
 """
 
 
 def doors_after(number: int) -> set[str]:
-    doors: set[str] = set()
-    for step in range(1, number + 1):
-        if step % 3:
-            doors.add(f'X{step}')
+    present: set[str] = set()
+    for each in range(1, number + 1):
+        if each % 5:
+            present.add(f'D{each}')
         else:
-            doors.discard(f'X{step - 1}')
-    return doors
+            present.discard(f'D{each - 1}')
+    return present
 
 
-def test_killed_at_any_moment_it_has_exactly_what_it_answered(server: Server) -> None:
+@pytest.mark.parametrize('synced', [False, True])
+def test_killed_at_any_moment_it_has_exactly_what_it_answered(tmp_path: Path, synced: bool) -> None:
+    server = Server(tmp_path / 'store', synced=synced)
+    server.ask(*LOAD, 'false', 'PELLET', 'false')
     server.service.close()
-    directory = str(server._directory)
+    directory = str(server.directory)
     seed = random.Random(7)
     answered = 0
     for _ in range(4):
@@ -464,6 +395,37 @@ def test_killed_at_any_moment_it_has_exactly_what_it_answered(server: Server) ->
         assert present in (doors_after(answered), doors_after(answered + 1))
         if present != doors_after(answered):
             answered += 1
+
+
+def test_a_store_of_before_is_read_once_and_put_aside(tmp_path: Path) -> None:
+    shutil.copytree(FIXTURES / 'journal', tmp_path / 'store')
+    server = Server(tmp_path / 'store')
+    assert [note for note in server.notes if 'the journal is put aside in converted-' in note]
+    assert not list((tmp_path / 'store').glob('*.log'))
+    assert len(list((tmp_path / 'store').glob('converted-*/*.log'))) == 2
+    for _ in range(2):
+        ask = server.ask
+        assert ask('GET ALL REFS').queried_objects == ['map']
+        assert ask('QUERY IND CLASS', 'DOOR').queried_objects == [f'<{OLD}#D1>']
+        assert ask('QUERY DATAPROP IND', 'visitedAt', 'Hall').queried_objects == ['"007"^^xsd:long']
+        assert ask('QUERY TAKEN BACK').queried_objects == ['a line']
+        assert ask('GET REF CLIENT', 'map').queried_objects == ['none']
+        server.restart()
+    server.ask('APPLY')
+    doors = server.ask('QUERY IND CLASS', 'DOOR').queried_objects
+    assert doors == [f'<{OLD}#D1>', f'<{OLD}#D2>'], 'it waited'
+    server.service.close()
+
+
+def test_damage_in_a_store_of_before_costs_what_was_damaged(tmp_path: Path) -> None:
+    shutil.copytree(FIXTURES / 'journal', tmp_path / 'store')
+    path = tmp_path / 'store' / 'journal-1.log'
+    path.write_bytes(path.read_bytes().replace(b'visitedAt', b'visitedat'))
+    server = Server(tmp_path / 'store')
+    assert [note for note in server.notes if '1 damaged entries are left out' in note]
+    doors = server.ask('QUERY IND CLASS', 'DOOR').queried_objects
+    assert doors == [f'<{OLD}#D1>']
+    server.service.close()
 
 
 TERMS = f"""
@@ -506,43 +468,22 @@ def test_a_record_that_nobody_wrote_is_refused(record: list[object]) -> None:
         decode(record)
 
 
-@pytest.mark.parametrize(
-    ('record', 'words'),
-    [
-        (['load', 'map'], 'not enough values'),
-        (['load', 'map', {'iri': IRI}, [], []], "no setting 'path'"),
-        (['change'], 'not enough values'),
-        (7, 'cannot be read'),
-    ],
-)
-def test_a_record_that_cannot_be_read_ends_the_start_with_one_line(
-    tmp_path: Path, record: object, words: str
-) -> None:
-    journal = Journal(tmp_path / 'store')
-    journal.append([record])
-    journal.close()
-    with pytest.raises(StoreError, match=words) as refused:
-        Store(tmp_path / 'store').recover()
-    assert '\n' not in str(refused.value)
-    assert 'cannot be read: ' in str(refused.value)
-
-
 def reference(count: int = 3) -> Reference:
     axioms = [ClassAssertion(f'{IRI}#K', f'{IRI}#n{number}') for number in range(count)]
     kb = KnowledgeBase(IRI, axioms)
     kb.reason()
     origin = Origin('/a/map.ttl', 'ntriples', {'x': 'urn:x#'})
-    buffering, quarantine = Buffering(True, True), Quarantine(lines=['a line'])
-    return Reference('map', kb, origin, buffering, 'me', quarantine, Effort(base=2.5))
+    return Reference('map', kb, origin, Buffering(False, True), 'me', Quarantine(lines=['a line']))
 
 
-@pytest.mark.parametrize('count', [0, 3, 100, 101, 250])
-def test_a_reference_is_made_from_its_records_again(tmp_path: Path, count: int) -> None:
+def test_a_reference_is_as_it_was(tmp_path: Path) -> None:
     store = Store(tmp_path / 'store')
-    ref = reference(count)
-    waits = Told('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#later')),))
-    ref.buffering.waiting.append(waits)
+    assert store.recover() == []
+    ref = reference()
     store.loaded(ref)
+    waits = Told('you', 7.0, (RenameEntity('individual', f'{IRI}#a', f'{IRI}#b'),))
+    ref.buffering.waiting.append(waits)
+    store.commit(ref)
     store.close()
     store = Store(tmp_path / 'store')
     (again,) = store.recover()
@@ -552,112 +493,88 @@ def test_a_reference_is_made_from_its_records_again(tmp_path: Path, count: int) 
     for name in ('name', 'origin', 'buffering', 'mounted'):
         assert getattr(again, name) == getattr(ref, name), name
     assert again.quarantine.lines == ['a line']
-    assert again.buffering.waiting == [waits]
     assert not again.opened
     assert store.notes == []
-    # Damage costs a hundred axioms at most, and never the settings.
-    lines = (tmp_path / 'store' / 'journal-0.log').read_text().splitlines()
-    assert len(lines) == 2 + -(-count // 100)
-
-
-def test_a_reference_whose_first_record_is_damaged_has_its_axioms_from_the_others(
-    tmp_path: Path,
-) -> None:
-    store = Store(tmp_path / 'store')
-    store.loaded(reference(150))
-    store.close()
-    path = tmp_path / 'store' / 'journal-0.log'
-    lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b'damaged\n' + b''.join(lines[1:]))
-    store = Store(tmp_path / 'store')
-    (again,) = store.recover()
-    store.close()
-    assert len(again.kb) == 150
-    assert again.mounted == 'me'
-    assert len(store.notes) == 1
 
 
 def test_what_was_not_reasoned_over_is_known_after_the_death_with_what_was_before(
     tmp_path: Path,
 ) -> None:
     store = Store(tmp_path / 'store')
+    store.recover()
     ref = reference()
-    ref.buffering.manipulation = False
     store.loaded(ref)
-    before = tuple(ref.kb.axioms())
+    before = set(ref.kb.axioms())
     told = [
         Told('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#{name}')),)) for name in 'ab'
     ]
     for one in told:
-        store.changed('map', one)
+        ref.submit(one)
+        store.commit(ref)
     ref.on_reasoning(1)
     # As after a death: nobody closed it.
-    left = json.loads((tmp_path / 'store' / 'reasoning').read_text())
-    assert left == {'map': [1, 1]}
-    fcntl.flock(store._journal._lock, fcntl.LOCK_UN)
-    again = Store(tmp_path / 'store')
+    note = tmp_path / 'store' / 'reasoning'
+    assert json.loads(note.read_text()) == {'map': [1, 1]}
+    with ref.lock:
+        shutil.copytree(tmp_path / 'store', tmp_path / 'copy')
+    note = tmp_path / 'copy' / 'reasoning'
+    again = Store(tmp_path / 'copy')
     (found,) = again.recover()
     assert found.quarantine.untested == told
-    assert set(found.quarantine.origin) == set(before)
+    assert set(found.quarantine.origin) == before
     assert (found.quarantine.deaths, found.quarantine.died_at) == (1, 1)
     # A further one counts on, until reasoning is completed.
     found.on_reasoning(-1)
-    assert json.loads((tmp_path / 'store' / 'reasoning').read_text()) == {'map': [2, -1]}
+    assert json.loads(note.read_text()) == {'map': [2, -1]}
     found.on_reasoning(None)
     found.on_completed()
     found.on_reasoning(0)
-    assert json.loads((tmp_path / 'store' / 'reasoning').read_text()) == {'map': [1, 0]}
+    assert json.loads(note.read_text()) == {'map': [1, 0]}
+    # Reasoned over, nothing of it is left to be tried.
+    with found.lock:
+        found.open()
+        again.commit(found)
     again.close()
-    assert (tmp_path / 'store' / 'reasoning').read_text() == '{}'
+    assert note.read_text() == '{}'
     store.close()
-
-
-def test_a_snapshot_is_written_from_the_size_on_that_was_set(tmp_path: Path) -> None:
-    store = Store(tmp_path / 'store', compact_from=1)
-    ref = reference()
-    store.loaded(ref)
-    size = store._journal.size
-
-    @contextmanager
-    def hold_all() -> Iterator[list[Reference]]:
-        yield [ref]
-
-    def compacted() -> bool:
-        begun = store._snapshot
-        store.compact_if_large(hold_all)
-        if store._snapshot is None or store._snapshot is begun:
-            return False
-        store._snapshot.join(60.0)
-        return True
-
-    store._compact_from = size + 1
-    assert not compacted()
-    # Reasoning over it may end the process, and the journal says by which directive.
-    ref.quarantine.untested = [Told('me', 0.0, ())]
-    store._compact_from = size
-    assert compacted()
-    assert not list((tmp_path / 'store').glob('snapshot-*'))
-    ref.quarantine.untested = [Told('me', 0.0, ())] * (store_module.MOST_UNTESTED + 1)
-    assert compacted()
-    (path,) = (tmp_path / 'store').glob('snapshot-*')
-    # The next one comes where the journal is as long as the snapshot.
-    store._compact_from = 1
-    while store._journal.size + 60 < path.stat().st_size:
-        store.mounted('map', 'me')
-    assert not compacted()
-    store.mounted('map', 'me')
-    store.mounted('map', 'me')
-    assert compacted()
-    store.close()
+    last = Store(tmp_path / 'copy')
+    (found,) = last.recover()
+    last.close()
+    assert (found.quarantine.untested, found.quarantine.origin) == ([], ())
 
 
 def test_nothing_is_written_to_a_store_that_was_closed(tmp_path: Path) -> None:
     store = Store(tmp_path / 'store')
+    store.recover()
     store.close()
     for use in (
-        lambda: store.mounted('map', 'me'),
+        lambda: store.loaded(reference()),
         lambda: store.dropped('map'),
-        lambda: store.flushed('map'),
+        lambda: store.check('map'),
     ):
         with pytest.raises(StoreError, match=r': closed$'):
             use()
+
+
+def test_a_folder_that_cannot_be_used_is_told(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(StoreError, match='file: '):
+        Store(tmp_path / 'file')
+
+
+@pytest.mark.parametrize('name', ['map', 'a/b', '..', '.hidden', 'ä' * 100, 'x' * 256, 'a b'])
+def test_every_reference_name_makes_a_file_name_of_its_own(name: str) -> None:
+    stem = file_stem(name)
+    assert '/' not in stem
+    assert stem not in ('.', '..', '')
+    assert len(stem) <= 200
+    assert stem != file_stem(name + 'x')
+
+
+def test_references_of_any_name_come_back(server: Server) -> None:
+    for name in ('a/b', '..', 'ä' * 100, 'a b'):
+        assert server.ask(*LOAD, 'false', '', 'false', reference=name).success
+    server.restart()
+    assert set(server.ask('GET ALL REFS').queried_objects) == {'map', 'a/b', '..', 'ä' * 100, 'a b'}
+    server.service.close()
+    assert os.listdir(server.directory)

@@ -6,7 +6,6 @@ An alert that one look alone does not make sure waits for a second look.
 from __future__ import annotations
 
 import contextlib
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -20,8 +19,6 @@ from indoor_watch.persons import Picture
 from indoor_watch.visit import Pictured, Visit
 from indoor_watch.watch_rules import Level, WatchRule, severity_of
 
-SENT_WITHIN = 60.0
-"""Whoever was told of a picture that is replaced has sent it by then, seconds."""
 Drawn = Callable[[tuple[float, float], Visit], tuple[Picture, Picture | None] | None]
 """Draws what a lidar met around a point of the map, and what stands there normally."""
 
@@ -60,8 +57,6 @@ class Alerting:
         self._verify_seconds = verify_seconds
         self._habits = Habits()
         self._doubts: dict[int, float] = {}
-        # Pictures that no event has any more, and since when.
-        self._replaced: deque[tuple[float, str]] = deque()
 
     def take(self, noted: Iterable[Pictured], visit: Visit) -> None:
         """Take what was noticed in a visit."""
@@ -76,10 +71,7 @@ class Alerting:
         seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=visit.at)
         self._tell(seen)
         words = '' if rule is None else rule.words()
-        before = self._pictures()
         event = self.book.take(seen, severity=severity, rule=words, visit=visit.number)
-        if evidence:
-            self._drop((before | {evidence}) - self._pictures(), seen.stamp)
         if event is None or rule is None or event.state != EventState.OPEN:
             return
         lasts = rule.lasting(event.looks, event.last - event.began)
@@ -104,21 +96,7 @@ class Alerting:
         if before is not None:
             picture = side_by_side(before, picture)
         what = f'{kind}{seen.kind}-{seen.subject or seen.place}-{seen.state}'
-        return self._store.keep(picture, what, severity, seen.stamp, self._pictures())
-
-    def _pictures(self) -> set[str]:
-        """Return the pictures of the events that go on."""
-        return {name for each in self.book.current for name in each.evidence}
-
-    def _drop(self, names: Iterable[str], stamp: float) -> None:
-        """Delete pictures that a later one replaces, once nobody sends them any more."""
-        if self._store is None:
-            return
-        self._replaced += [(stamp, each) for each in names]
-        while self._replaced and not 0.0 <= stamp - self._replaced[0][0] < SENT_WITHIN:
-            _, name = self._replaced.popleft()
-            if name not in self._pictures():
-                self._store.delete(name)
+        return self._store.keep(picture, what, severity, seen.stamp)
 
     def end(self, numbers: Iterable[int], stamp: float) -> None:
         """Take that what made some events is seen no more."""

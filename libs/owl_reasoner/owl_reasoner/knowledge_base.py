@@ -180,6 +180,11 @@ class KnowledgeBase:
         return bool(self._told.added or self._told.removed or self._told.schema_changed)
 
     @property
+    def starts_anew(self) -> bool:
+        """Whether the next `reason` begins from nothing: the first, and one after an early end."""
+        return self._derived.engine is None
+
+    @property
     def unsupported(self) -> tuple[str, ...]:
         """One sentence for each asserted axiom (or part) that the reasoner does not fully use.
 

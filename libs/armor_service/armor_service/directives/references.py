@@ -7,7 +7,7 @@ import threading
 import time
 from pathlib import Path
 
-from armor_service.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, Settings
+from armor_service.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, WORLD_ENDINGS, Settings
 from armor_service.directives.table import control, flag, text, utility
 from armor_service.protocol import (
     DirectiveError,
@@ -131,9 +131,8 @@ def _rebuffer(workspace: Workspace, request: DirectiveRequest, buffered: bool) -
             return False
         if ref.buffering.manipulation != buffered:
             workspace.check_free(ref, request.client_name)
-            if workspace.store:
-                workspace.store.buffered(ref.name, buffered)
             ref.buffer(buffered)
+            workspace.commit(ref)
     return True
 
 
@@ -158,8 +157,6 @@ def _drop(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse:
     finally:
         if free:
             ref.lock.release()
-    if workspace.worlds:
-        workspace.worlds.drop(ref)
     workspace.tell(ref.name, None)
     # Not yet: this directive and those that wait for the lock still refer to it.
     release = threading.Timer(RELEASE_AFTER, _release, args=(workspace, ref))
@@ -231,6 +228,23 @@ def _save(workspace: Workspace, request: DirectiveRequest, path: str) -> Directi
     return DirectiveResponse()
 
 
+@utility(
+    'BACKUP',
+    text('path'),
+    native=False,
+    summary='Writes a copy of the World of the reference, as of now, to a file below the '
+    'ontologies folder that ends in .sqlite3. Only where the service keeps references.',
+    slow=True,
+)
+def _backup(workspace: Workspace, request: DirectiveRequest, path: str) -> DirectiveResponse:
+    with workspace.references.locked(request.reference_name) as ref:
+        name = ref.name
+    if workspace.store is None:
+        raise DirectiveError('BACKUP: the service keeps no references; SAVE writes one')
+    workspace.store.backup(name, workspace.paths.to_write(path, WORLD_ENDINGS))
+    return DirectiveResponse()
+
+
 def _loaded_file(workspace: Workspace, ref: Reference) -> str:
     if not ref.origin.file:
         raise DirectiveError(f'SAVE: {ref.name} was loaded from {ref.origin.path}; expected a path')
@@ -260,9 +274,8 @@ def _mount(workspace: Workspace, request: DirectiveRequest) -> DirectiveResponse
             problem = f'{refusal} Another client is already mounted on it.'
             raise DirectiveError(problem, ExitCode.MOUNT_REFUSED)
         note = f'{client} is mounted already' if ref.mounted == client != NOBODY else ''
-        if workspace.store and ref.mounted != client:
-            workspace.store.mounted(name, client)
         ref.mounted = client
+        workspace.commit(ref)
     return DirectiveResponse(error_description=note)
 
 
@@ -276,9 +289,8 @@ def _unmount(workspace: Workspace, request: DirectiveRequest) -> DirectiveRespon
         if ref.mounted != request.client_name:
             note = f'{request.client_name} is not mounted on {ref.name}'
             return DirectiveResponse(error_description=note)
-        if workspace.store:
-            workspace.store.mounted(ref.name, NOBODY)
         ref.mounted = NOBODY
+        workspace.commit(ref)
     return DirectiveResponse()
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
-from owl_reasoner.documents.rdf_xml import Graph, Node
+from owl_reasoner.documents.rdf_xml import Graph, Node, Triple
 from owl_reasoner.documents.xml_reading import DEEPEST, IllFormedError
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
@@ -240,6 +240,12 @@ class _Statements:
         """Return which of object and data property a name is, as far as is known."""
         return self.kinds.get(str(prop), set()) & {'object_property', 'data_property'}
 
+    def only_annotates(self, name: str) -> bool:
+        """Tell whether a name is an annotation property, and no other kind of property or class;
+        it may be an individual as well, of which something is said.
+        """
+        return self.kinds.get(name, set()) - {'individual'} == {'annotation_property'}
+
     def is_data(self, prop: str, range_node: Node | None = None) -> bool:
         kinds = self.value_kinds(prop)
         if len(kinds) == 1:
@@ -447,12 +453,16 @@ class RdfMapper:
 
     Attributes:
         axioms: In document order; there after `read`.
+        sources: What each of them was read from, but for plain facts of individuals: the node
+            that stands for it, or (subject, predicate, value); several where it is stated again.
         unsupported: One sentence for each statement that was not understood.
         prefixes: The prefixes that the document declares.
     """
 
     def __init__(self, graph: Graph, base: str = '') -> None:
         self.axioms: dict[Axiom, None] = {}
+        self.sources: dict[Axiom, list[str | Triple]] = {}
+        self._source: str | Triple = ''
         self._base = base
         self.unsupported = graph.unsupported.copy()
         self.prefixes = graph.prefixes
@@ -503,10 +513,11 @@ class RdfMapper:
 
     def _add(self, axiom: Axiom) -> None:
         self.axioms[axiom] = None
+        self.sources.setdefault(axiom, []).append(self._source)
         self._added.append(axiom)
 
     def _subject(self, subject: str, properties: dict[str, list[Node]]) -> None:
-        self._graph.subject_read = subject
+        self._graph.subject_read = self._source = subject
         self._added = []
         types = [value for value in properties.get(_TYPE, ()) if isinstance(value, str)]
         special = next((_SPECIAL[name] for name in types if name in _SPECIAL), None)
@@ -518,7 +529,9 @@ class RdfMapper:
             self._attempt(subject, special, self, subject, properties)
             return
         for value in properties.get(_TYPE, ()):
+            self._source = (subject, _TYPE, value)
             self._attempt(subject, self._type, subject, value)
+        self._source = subject
         if OWL + 'onProperty' in properties and not subject.startswith('_:'):
             self._attempt(subject, self._named_restriction, subject, properties)
         if subject.startswith(BUILT_IN[:3]) and subject not in _WITH_AXIOMS:
@@ -531,13 +544,14 @@ class RdfMapper:
                 if record is not None and type(value) is of_value:
                     self.axioms[record(predicate, subject, value)] = None
                 else:
+                    self._source = (subject, predicate, value)
                     self._attempt(subject, self._triple, subject, predicate, value)
 
     def _reserved(self, subject: str, properties: dict[str, list[Node]]) -> None:
         """Report what is said of a word of OWL's own, which means what OWL says."""
         types = {value for value in properties.get(_TYPE, ()) if isinstance(value, str)}
         said = properties.keys() & _OF_PROPERTIES or types & {*CHARACTERISTICS, _FUNCTIONAL}
-        if said and self._graph.kinds.get(subject) != {'annotation_property'}:
+        if said and not self._graph.only_annotates(subject):
             told = ', '.join(sorted(map(local_name, said)))
             self._report(subject, f'{told} of {local_name(subject)}, a word of OWL, has no effect')
 
@@ -557,7 +571,7 @@ class RdfMapper:
         if handler is None:
             self._statement(subject, predicate, value)
         elif isinstance(value, str):
-            is_annotation = self._graph.kinds.get(subject) == {'annotation_property'}
+            is_annotation = self._graph.only_annotates(subject)
             if is_annotation and predicate in _OF_PROPERTIES:
                 self._add(ax.AnnotationAssertion(predicate, subject, value))
             elif axiom := handler(self, subject, value):
