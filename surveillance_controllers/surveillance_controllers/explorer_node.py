@@ -36,7 +36,11 @@ from lidar_navigation import (
     Velocity,
 )
 from lidar_navigation.geometry import Pose, Scan, composed, relative
-from lidar_navigation.localisation.odometry import ContinuousOdometry, OdometryBuffer, joined
+from lidar_navigation.localisation.odometry import (
+    ContinuousOdometry,
+    OdometryBuffer,
+    joined_if_known,
+)
 from state_machines.ros import ClockWait
 from strict_files.files import FileError, in_one_line, replace_text
 from strict_files.settings import parameter
@@ -122,6 +126,7 @@ class Explorer(PatrolNode):
         self._odometry: Pose | None = None
         self._reading: Pose | None = None
         self._heard_scan = False
+        self._scans = self._left_out = self._told_left_out = 0
         # No setting of the clock makes a drive wait, or give up.
         self._wait = ClockWait(self)
         self._lock, self._saving = threading.Lock(), threading.Lock()
@@ -195,11 +200,20 @@ class Explorer(PatrolNode):
             if self._odometry is None:
                 return
             odometry, reading = self._odometry, self._reading
-            scan = joined(scan, self._readings, seconds_of(stamp))
+            seen = joined_if_known(scan, self._readings, seconds_of(stamp))
             self._heard_scan = True
+            self._scans += 1
+            self._left_out += seen is None
             stands = self._hold.active or self.stopping.is_set()
             passed = self._wait.elapsed()
-            velocity = self.exploration.see(scan, odometry, passed, stands=stands)
+            # Where it was made is not known: it is driven by, and no part of the map.
+            velocity = self.exploration.see(
+                scan if seen is None else seen,
+                odometry,
+                passed,
+                stands=stands,
+                maps=seen is not None,
+            )
             self._base.command(velocity)
         self._tell_pose(odometry, reading, stamp)
 
@@ -243,12 +257,22 @@ class Explorer(PatrolNode):
                         f'to ({x:.1f}, {y:.1f}), {aim.way:.1f} m away: {aim.length:.1f} m of the '
                         'unknown begin there'
                     )
+            self._tell_left_out()
             missing = self._missing()
             if missing and time.monotonic() - told >= _TELL:
                 told = time.monotonic()
                 self.get_logger().info(f'waiting for {missing}')
             if not changed:
                 self.stopping.wait(_WAIT)
+
+    def _tell_left_out(self) -> None:
+        """Say that scans are left out, when there are more than were told by a tenth of all."""
+        if self._left_out - self._told_left_out > max(10, self._scans / 10):
+            self._told_left_out = self._left_out
+            self.get_logger().warn(
+                f'{self._left_out} of {self._scans} scans are left out of the map: no odometry of '
+                'their time came (a busy machine or network, or stamps of different clocks)'
+            )
 
     def _missing(self) -> str:
         """Return what has not come yet; empty when the robot can begin."""
@@ -302,6 +326,8 @@ class Explorer(PatrolNode):
                 replace_text(Path(self._settings.folder, DONE_FILE), text)
             except OSError as error:
                 logger.error(f'what is left is not kept: {in_one_line(error)}')
+        if self._left_out:
+            logger.info(f'{self._left_out} of {self._scans} scans were left out of the map')
         logger.info('all that can be reached has been seen')
         self.finish()
 

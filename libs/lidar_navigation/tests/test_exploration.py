@@ -263,3 +263,16 @@ def test_near_what_it_goes_for_it_does_not_change_its_mind_for_little() -> None:
     assert exploration._apart(exploration.goal, goal) < 1.0
     assert isinstance(exploration._task, Drive)
     assert not isinstance(exploration._task, Spin)
+
+
+def test_a_scan_of_which_nobody_knows_where_it_was_made_is_no_part_of_the_map() -> None:
+    exploration, builder = begun(hall(80))
+    kept = len(builder.kept)
+    for step in range(1, 5):
+        sees(exploration, 0.1 * step, maps=False)
+        exploration.think()
+    assert len(builder.kept) == kept
+    assert sees(exploration, 0.6, maps=False).speed > 0.0, 'it is driven by'
+    sees(exploration, 0.7)
+    exploration.think()
+    assert len(builder.kept) == kept + 1

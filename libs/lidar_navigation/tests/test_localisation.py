@@ -147,7 +147,7 @@ def test_a_map_of_any_size_is_searched(shape: tuple[int, int], value: int) -> No
     for met, reach in ((0.5, 8.0), (999.0, 1000.0)):
         scan = Scan(angles, np.full(90, met), reach)
         localiser.see(scan, now=0.0)
-        assert all(explained <= 1.0 for _, explained in localiser.search(scan))
+        assert all(explained.fit <= 1.0 for _, explained in localiser.search(scan))
 
 
 def test_a_robot_that_sees_nothing_of_its_map_is_lost_and_found_again(flat: Any) -> None:

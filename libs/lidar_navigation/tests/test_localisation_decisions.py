@@ -36,17 +36,18 @@ class Told(Localiser):
         self.refutes = True
         fit: Any = self._fit
         fit.matched = lambda pose, points, moved: pose
-        fit.evidence = lambda pose, scan: SimpleNamespace(
-            fit=self.worth(pose), hit=self.worth(pose), refutes=self.refutes
-        )
+        fit.evidence = lambda pose, scan: self._told(self.worth(pose))
 
     def _warn(self) -> None:
         self.warnings += 1
 
-    def search(self, scan: Scan) -> list[tuple[Pose, float]]:
+    def search(self, scan: Scan) -> list[tuple[Pose, Any]]:
         """Return what the test says."""
         self.searches += 1
-        return list(self.finds)
+        return [(pose, self._told(share)) for pose, share in self.finds]
+
+    def _told(self, share: float) -> Any:
+        return SimpleNamespace(fit=share, hit=share, refutes=self.refutes)
 
     def agrees(self, share: float, now: float) -> None:
         """See a scan of which every pose explains so much."""

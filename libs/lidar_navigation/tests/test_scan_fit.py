@@ -41,11 +41,11 @@ def test_the_part_of_the_rays_that_a_pose_explains_is_counted() -> None:
 
     assert explained(3.0, 1.0, 1.0, 1.0) == 1.0
     assert explained(2.0, 1.0, 1.0, 1.0) == 0.875, 'something new may stand there'
-    assert explained(4.0, 1.0, 1.0, 1.0) == 0.5, 'no ray goes through a wall'
+    assert explained(4.0, 1.0, 1.0, 1.0) == 0.75, 'no ray goes through a wall'
     assert explained(2.0, 1.0, np.nan, np.nan) == 0.75, 'what tells nothing does not count'
     assert explained(*[np.nan] * 4) == 0.0
     slack = HIT + 0.025
-    assert explained(3.0 + slack + 0.03, 1.0 - slack - 0.03, 1.0, 1.0) == 0.375
+    assert explained(3.0 + slack + 0.03, 1.0 - slack - 0.03, 1.0, 1.0) == 0.5, 'one is too long'
     assert explained(3.0 + slack - 0.03, 1.0 - slack + 0.03, 1.0, 1.0) == 1.0
 
 
@@ -182,9 +182,9 @@ def test_the_robot_can_stand_where_its_body_overlaps_nothing() -> None:
 
 def test_a_pose_is_refuted_by_rays_through_walls_or_where_next_to_none_is_as_mapped() -> None:
     assert not Evidence(0.5, 0.5, 0.0).refutes, 'half of it is new'
-    assert not Evidence(0.26, 0.7, 0.04).refutes
+    assert not Evidence(0.21, 0.75, 0.04).refutes
     assert Evidence(0.9, 0.0, 0.1).refutes
-    assert Evidence(0.2, 0.8, 0.0).refutes
+    assert Evidence(0.19, 0.81, 0.0).refutes
     assert Evidence(0.0, 0.0, 1.0).fit == 0.0
 
 

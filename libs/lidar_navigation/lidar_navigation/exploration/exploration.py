@@ -154,7 +154,9 @@ class Exploration:
         correction = self._correction
         return self.builder.start if correction is None else composed(correction, odometry)
 
-    def see(self, scan: Scan, odometry: Pose, now: float, *, stands: bool = False) -> Velocity:
+    def see(
+        self, scan: Scan, odometry: Pose, now: float, *, stands: bool = False, maps: bool = True
+    ) -> Velocity:
         """Take a scan, and return with which velocity to go on.
 
         Args:
@@ -163,15 +165,17 @@ class Exploration:
             now: The time, seconds.
             stands: The robot is to stand where it is; no time passes for what is under way, which
                 then goes on.
+            maps: Whether where it was made is known; else it is driven by, and no part of the map.
         """
         with self._lock:
             if stands and self._heard_at is not None:
                 self._stood += now - self._heard_at
             self._heard_at = now
             self._now = now = now - self._stood
-            self._scan = scan, odometry
-            if self._pending is None and self.builder.is_due(odometry):
-                self._pending = self._scan
+            if maps:
+                self._scan = scan, odometry
+            if maps and self._pending is None and self.builder.is_due(odometry):
+                self._pending = scan, odometry
             pose = self.pose(odometry)
             if stands:
                 return Velocity()

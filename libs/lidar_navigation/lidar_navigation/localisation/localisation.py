@@ -343,7 +343,7 @@ class Localiser:
                 # What fits again may be another place that looks alike.
                 self._shaken = False
                 self._before_search()
-                self._rivals = self._alike([(corrected, agreement), *self.search(thin)])
+                self._rivals = self._alike([(corrected, evidence), *self.search(thin)])
             return
         self.agreement = agreement
         if self._look_at is None:
@@ -362,12 +362,16 @@ class Localiser:
         candidates = self.search(thin)
         # A pose that something new explains is kept, however well another one fits.
         found = candidates[0] if candidates and evidence.refutes else None
-        if found is not None and self._is_near(found[0]) and self._is_better(found, agreement):
+        if (
+            found is not None
+            and self._is_near(found[0])
+            and found[1].fit >= max(p.lost_below, agreement + p.better)
+        ):
             self.jumps += 1
-            self._settle(*found)
+            self._settle(found[0], found[1].fit)
             self._shaken = False
             # Somebody may only have stood in the way: where it was until now stays likely.
-            self._rivals = [_Rival(corrected, agreement - found[1]), *self._alike(candidates)]
+            self._rivals = [_Rival(corrected, agreement - found[1].fit), *self._alike(candidates)]
         elif found is not None and self._follow(candidates, agreement) and self._rounds < p.rounds:
             self._rounds += 1
         elif agreement >= p.lost_below:
@@ -389,10 +393,6 @@ class Localiser:
         turned = abs(angle_between(self.pose[2], pose[2]))
         return math.dist(pose[:2], self.pose[:2]) <= p.at_once and turned <= p.same_way
 
-    def _is_better(self, found: tuple[Pose, float], agreement: float) -> bool:
-        p = self.parameters
-        return found[1] >= max(p.lost_below, agreement + p.better)
-
     def _needed(self, pose: Pose) -> float:
         """Return how much more a pose must explain to be followed."""
         p = self.parameters
@@ -403,23 +403,23 @@ class Localiser:
         """Whether a rival leads."""
         return any(rival.lead > 0.0 for rival in self._rivals)
 
-    def _follow(self, candidates: list[tuple[Pose, float]], agreement: float) -> bool:
+    def _follow(self, candidates: list[tuple[Pose, Evidence]], agreement: float) -> bool:
         """Follow poses far away, or turned, that explain much more; tell whether there are any."""
         p = self.parameters
         better = [
-            explained
+            explained.fit
             for pose, explained in candidates
-            if explained >= max(p.lost_below, agreement + self._needed(pose))
+            if explained.fit >= max(p.lost_below, agreement + self._needed(pose))
         ]
         if not better:
             return False
         # With it those that look alike, wherever they are.
-        alike = [each for each in candidates if each[1] >= max(better) - p.alike / 2]
+        alike = [each for each in candidates if each[1].fit >= max(better) - p.alike / 2]
         known = [rival.pose for rival in self._rivals]
         for pose, explained in alike[: p.most_rivals]:
             if not any(self._same(pose, other) for other in known):
                 known.append(pose)
-                self._rivals.append(_Rival(pose, (explained - agreement) / 3, is_equal=False))
+                self._rivals.append(_Rival(pose, (explained.fit - agreement) / 3, is_equal=False))
         return True
 
     def _settle(self, pose: Pose, agreement: float) -> None:
@@ -434,24 +434,18 @@ class Localiser:
             rate = 0.2
         self._usual += rate * (agreement - self._usual)
 
-    def _alike(self, candidates: list[tuple[Pose, float]]) -> list[_Rival]:
+    def _alike(self, candidates: list[tuple[Pose, Evidence]]) -> list[_Rival]:
         """Return the candidates that explain about as much as the first."""
         p = self.parameters
         taken: list[Pose] = [candidates[0][0]]
         for pose, explained in candidates[1:]:
-            good = explained >= max(candidates[0][1] - p.alike, p.lost_below)
+            good = explained.hit >= max(candidates[0][1].hit - p.alike, p.lost_below)
             if good and not any(self._same(pose, other) for other in taken):
                 taken.append(pose)
         return [_Rival(pose) for pose in taken[1 : p.most_rivals + 1]]
 
-    def _worth(self, pose: Pose, explained: float) -> float:
-        # Among poses that explain a scan as well, the nearest one is the likeliest, and the one
-        # that looks the same way: a robot that is pushed or slips seldom turns round.
-        turned = abs(angle_between(self.pose[2], pose[2]))
-        return explained - 0.003 * min(math.dist(pose[:2], self.pose[:2]), 20.0) - 0.02 * turned
-
-    def search(self, scan: Scan) -> list[tuple[Pose, float]]:
-        """Return poses anywhere that explain a scan, and how well, the likeliest first."""
+    def search(self, scan: Scan) -> list[tuple[Pose, Evidence]]:
+        """Return poses anywhere that explain a scan, and its evidence; the likeliest first."""
         return found_poses(self._fit, scan, self.pose)
 
     def explained(self, pose: Pose, scan: Scan) -> float:

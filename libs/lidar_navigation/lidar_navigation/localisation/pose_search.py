@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidar_navigation.geometry import Points, Pose, Scan, angle_between, in_map
-from lidar_navigation.localisation.scan_fit import ScanFit
+from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
 
 LATTICE = 0.25
 """Distance of the poses that a search tries, metres."""
@@ -30,7 +30,7 @@ _POINTS = 40
 _FEWEST = 8
 
 
-def found_poses(fit: ScanFit, scan: Scan, last: Pose) -> list[tuple[Pose, float]]:
+def found_poses(fit: ScanFit, scan: Scan, last: Pose) -> list[tuple[Pose, Evidence]]:
     """Look everywhere for poses that explain a scan.
 
     Args:
@@ -39,8 +39,8 @@ def found_poses(fit: ScanFit, scan: Scan, last: Pose) -> list[tuple[Pose, float]
         last: Where the robot was believed to be.
 
     Returns:
-        Poses and how well each explains the scan, the likeliest first; empty when it shows too
-        little. Of poses that explain as much, one near the last pose comes first.
+        Poses and what the scan says of each, the likeliest first; empty when it shows too little.
+        Of poses that explain as much, one near the last pose comes first.
     """
     points = scan.thinned(_POINTS).points
     if len(points) < _FEWEST:
@@ -53,18 +53,19 @@ def found_poses(fit: ScanFit, scan: Scan, last: Pose) -> list[tuple[Pose, float]
     near = max(found, key=lambda each: _worth(each, last), default=None)
     found += _refined(fit, places, scores, headings, MOST, scan)
     found.sort(key=lambda each: -_worth(each, last))
-    if near is not None and near[1] >= SURE:
+    if near is not None and near[1].hit >= SURE:
         found.remove(near)
         found.insert(0, near)
     return found
 
 
-def _worth(found: tuple[Pose, float], last: Pose) -> float:
+def _worth(found: tuple[Pose, Evidence], last: Pose) -> float:
     pose, explained = found
     # Among poses that explain a scan as well, the nearest one is the likeliest, and the one
     # that looks the same way: a robot that is pushed or slips seldom turns round.
     turned = abs(angle_between(last[2], pose[2]))
-    return explained - 0.003 * min(math.dist(pose[:2], last[:2]), 20.0) - 0.02 * turned
+    # None of them was believed before: a wall where the map has a door tells them apart.
+    return explained.hit - 0.003 * min(math.dist(pose[:2], last[:2]), 20.0) - 0.02 * turned
 
 
 def _scored(fit: ScanFit, points: Points, headings: Points) -> tuple[Points, NDArray[np.float32]]:
@@ -106,8 +107,8 @@ def _refined(
     headings: Points,
     count: int,
     scan: Scan,
-) -> list[tuple[Pose, float]]:
-    """Refine a lattice's best poses; return them with the part of the rays each explains."""
+) -> list[tuple[Pose, Evidence]]:
+    """Refine a lattice's best poses; return them with what the scan says of each."""
     most = 60 * count
     # The best poses are at the best places.
     best = np.argsort(-scores.max(axis=0))[:most]
@@ -115,7 +116,7 @@ def _refined(
     poses = np.column_stack([places[best[place]], headings[heading]])
     tried = _apart(poses, count, 2 * LATTICE)
     refined = [fit.matched(pose, scan.points, (1.0, 1.0)) for pose in tried]
-    return [(pose, fit.evidence(pose, scan).fit) for pose in refined if fit.can_stand(pose)]
+    return [(pose, fit.evidence(pose, scan)) for pose in refined if fit.can_stand(pose)]
 
 
 def _overlap(shift: int, count: int, image: int) -> tuple[slice, slice]:

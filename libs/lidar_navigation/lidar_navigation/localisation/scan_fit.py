@@ -30,13 +30,9 @@ With as little as one that goes through a wall, a robot before a shut door took 
 another room. With as much as one that agrees, one that was carried into a smaller room would not
 notice it.
 """
-LONG = 1.0
-"""What a ray takes away that goes on through what the map has occupied. Where things hide half of
-the walls, the right pose is told by this alone: others explain as many rays, and contradict some.
-"""
 REFUTING = 0.05
 """A pose is refuted when a greater part of the rays goes on through what the map has occupied,"""
-SUPPORT = 0.25
+SUPPORT = 0.2
 """or a smaller one goes as far as it should."""
 SPREAD = 0.2
 """Points further than about this from any edge lose their weight, metres."""
@@ -59,8 +55,13 @@ class Evidence(NamedTuple):
 
     @property
     def fit(self) -> float:
-        """How well the pose explains the scan, 0 to 1."""
-        return max(0.0, self.hit + SHORT * self.short - LONG * self.long)
+        """How well the pose explains the scan, 0 to 1.
+
+        What is new excuses no pose from which rays go through walls.
+        """
+        if self.long > REFUTING:
+            return self.hit
+        return self.hit + SHORT * self.short
 
     @property
     def refutes(self) -> bool:
