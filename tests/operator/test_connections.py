@@ -48,7 +48,7 @@ def page(monkeypatch: pytest.MonkeyPatch, slow: Slow) -> Iterator[Page]:
     broadcaster = Broadcaster()
     actions: dict[str, Any] = {'stop': stop, 'slow': slow}
     page = Page(broadcaster, questions={}, actions=actions, port=0, token='secret')
-    broadcaster.show(MissionState(namespace='x' * 100_000))
+    broadcaster.show(MissionState())
     page.start()
     yield page
     slow.may_end.set()
@@ -119,7 +119,7 @@ def test_a_viewer_that_reads_nothing_is_cut_off(
     number = 0
     while not cut.wait(0.02):
         number += 1
-        page._broadcaster.show(MissionState(namespace=f'{number}' * 100_000))
+        page._broadcaster.show_parts({'why': f'{number}' * 100_000}, 1.0, whole=False)
     peer.close()
 
 

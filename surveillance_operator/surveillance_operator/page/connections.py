@@ -16,6 +16,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 HEADER_TIME = 5.0
 """Seconds within which the head of a request has to be there."""
+GRACE = 1.0
+"""Seconds for which a connection without a whole request counts as one that is about to ask."""
 BODY_SILENCE = 10.0
 """Seconds after which a body that does not go on is given up."""
 UNREAD_TIME = 10.0
@@ -87,9 +89,16 @@ class BoundedConnection(H11Protocol):
         wait = None if seconds is None else self.loop.call_later(seconds, self.transport.abort)
         self._deadline = wait
 
+    @property
+    def use(self) -> int:
+        """How much somebody waits for this connection: the least useful one makes room."""
+        if self.cycle is not None and self.cycle.response_complete:
+            return 0  # it only stays open for a next request
+        if not self.is_whole:
+            return 1 if self.loop.time() - self._since > GRACE else 3
+        return 2 if self.cycle.response_started else 4  # a viewer's stream, which it asks for again
+
     def _make_room(self) -> None:
-        """End the oldest connection that asked for nothing yet, else the oldest of all."""
+        """End the least useful of the other connections, the oldest of those."""
         others: list[Any] = [each for each in self.connections if each is not self]
-        useless = [each for each in others if not each.is_whole]
-        oldest = min(useless or others, key=lambda each: each._since)
-        oldest.transport.abort()
+        min(others, key=lambda each: (each.use, each._since)).transport.abort()

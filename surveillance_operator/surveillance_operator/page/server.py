@@ -11,6 +11,7 @@ from the proxy, which is on this machine.
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import ipaddress
 import logging
@@ -18,13 +19,13 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import uvicorn
-from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -154,7 +155,7 @@ class Page:
         )
         self._server = uvicorn.Server(config)
         self._thread: threading.Thread | None = None
-        self._stop_threads: CapacityLimiter | None = None
+        self._stop_threads = ThreadPoolExecutor(8, 'stop')
 
     @property
     def needs_token(self) -> bool:
@@ -188,6 +189,7 @@ class Page:
     def stop(self) -> None:
         """End the streams and the server."""
         self._broadcaster.close()
+        self._stop_threads.shutdown(wait=False)
         self._server.should_exit = True
         if self._thread is not None:
             self._thread.join(3.0)
@@ -307,11 +309,7 @@ class Page:
             given = None
         if not isinstance(given, dict):
             return JSONResponse({'ok': False, 'text': 'expected a JSON object'}, 400)
-        if name not in STOPPING:
-            return await _answered(action, given)
-        if self._stop_threads is None:  # it belongs to the loop that serves
-            self._stop_threads = CapacityLimiter(8)
-        return await _answered(action, given, self._stop_threads)
+        return await _answered(action, given, self._stop_threads if name in STOPPING else None)
 
 
 class _Guard:
@@ -354,11 +352,15 @@ class _Guard:
 
 
 async def _answered(
-    call: Action, fields: Mapping[str, Any], threads: CapacityLimiter | None = None
+    call: Action, fields: Mapping[str, Any], threads: Executor | None = None
 ) -> Response:
     try:
         inspect.signature(call).bind(**fields)
-        result = await to_thread.run_sync(partial(call, **fields), limiter=threads)
+        if threads is None:
+            result = await run_in_threadpool(call, **fields)
+        else:
+            loop = asyncio.get_running_loop()
+            result = await loop.run_in_executor(threads, partial(call, **fields))
     except (ValueError, TypeError, CallError) as error:
         return JSONResponse({'ok': False, 'text': str(error)}, 422)
     return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
