@@ -96,7 +96,8 @@ def test_a_level_lies_over_the_reference_level(
     path = building(tmp_path, level('L1', 0.0), level('L2', 4.0, scale=2.0, shift=300.0))
     assert main([str(path)]) == 2
     said = capsys.readouterr().err
-    assert '2 levels (L1, L2): expected --level with one of them' in said
+    assert '2 levels (L1, L2), and a place is one floor: expected --level with one of them' in said
+    assert said.count('\n') == 1
     assert main([str(path), '--level', 'L3']) == 2
     assert "no level 'L3'" in capsys.readouterr().err
     assert main([str(path), '--level', 'L2']) == 0

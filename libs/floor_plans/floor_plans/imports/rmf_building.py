@@ -87,7 +87,8 @@ def level_of(path: Path, levels: Mapping[str, Any], name: str) -> str:
         return name
     if len(names) != 1:
         raise FileError(
-            f'{path}: {len(names)} levels ({", ".join(names)}): expected --level with one of them'
+            f'{path}: {len(names)} levels ({", ".join(names)}), and a place is one floor: expected '
+            '--level with one of them, a place for each'
         )
     return names[0]
 
