@@ -46,6 +46,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help=f'radius of the robot, metres (default: {ROBOT_RADIUS:g})',
     )
     parser.add_argument(
+        '--update',
+        type=Path,
+        metavar='PLACE',
+        help='the place of an older map of this building: rooms that are still there keep their '
+        'names and all that is said of them, and what has changed is told',
+    )
+    parser.add_argument(
         '--with-outside',
         action='store_true',
         help='make a room of what is outside of the building, up to the edge of the map',
@@ -81,6 +88,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
                 labels=options.labels,
                 force=options.force,
                 with_outside=options.with_outside,
+                update=options.update,
                 command=f'{parser.prog} {options.map}',
             )
         )

@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from floor_plans import ROBOT_RADIUS, read_place
+from floor_plans.description import described_in
 from floor_plans.drawing import draw_place
 from floor_plans.facts import counted, facts
 from floor_plans.imports.graphs import SUFFIXES, read_graph
+from floor_plans.imports.renewal import renewed
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import LeftOut, Proposal, propose
 from floor_plans.map_rooms.proposal import OUTSIDE
@@ -50,6 +52,8 @@ class ImportRequest:
         labels: Where to write the rooms as a picture; None: nowhere.
         force: Whether to write over a place that is there already.
         with_outside: What is outside of the building is a room, too.
+        update: The place of an older map of the building, from which rooms keep their names;
+            None: there is none.
         command: What a person typed, for the head of the place's file; empty: nothing.
         kept: Files that are not written over, whatever was asked for.
     """
@@ -62,6 +66,7 @@ class ImportRequest:
     labels: Path | None = None
     force: bool = False
     with_outside: bool = False
+    update: Path | None = None
     command: str = ''
     kept: tuple[Path, ...] = ()
 
@@ -123,7 +128,25 @@ def import_place(request: ImportRequest) -> ImportReport:
         reference['map_file_resolution'] = building.resolution
     if building.picture is not None:
         request = replace(request, kept=(building.picture,))
-    return _written(request, proposal, reference, proposal.parameters, list(building.notes))
+    parameters = proposal.parameters
+    changes: tuple[str, ...] = ()
+    if request.update is not None:
+        parameters, changes = _updated(request, request.update, building, proposal)
+    return _written(request, proposal, reference, parameters, [*building.notes, *changes])
+
+
+def _updated(
+    request: ImportRequest, older: Path, building: OccupancyMap, proposal: Proposal
+) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    """Return a place's parameters with what an older place says, and what has changed."""
+    plan = read_place(older, radius=request.radius).plan
+    if not plan.is_enclosed:
+        raise ValueError(f'--update {older}: has neither walls nor a map: expected one to compare')
+    try:
+        found = renewed(plan, described_in(older)[1], building, proposal)
+    except ValueError as error:
+        raise ValueError(f'--update {older}: {error}') from None
+    return found.parameters, found.changes
 
 
 def _is_free(path: Path, request: ImportRequest) -> None:
@@ -204,11 +227,11 @@ def _explained(proposal: Proposal, content: Mapping[str, Any]) -> list[str]:
     ]
     if doubtful:
         lines.append(f'doubtful, look at these first: {", ".join(doubtful)}')
-    for wall, room in proposal.entrances.items():
-        lines.append(f'{wall}: a wall that closes the way out of {room}')
+    for each in content['entrances']:
+        lines.append(f'{each["wall"]}: a wall that closes the way out of {each["room"]}')
     reasons: dict[str, list[LeftOut]] = {}
-    for each in proposal.left_out:
-        reasons.setdefault(each.reason, []).append(each)
+    for part in proposal.left_out:
+        reasons.setdefault(part.reason, []).append(part)
     for reason, parts in reasons.items():
         points = ', '.join(
             f'({x:.1f}, {y:.1f})' for x, y in (each.at for each in parts[:_MOST_POINTS])
@@ -248,9 +271,13 @@ def _content(proposal: Proposal, parameters: Mapping[str, Any]) -> dict[str, Any
                 'joins': joins[name],
                 'at': list(row[:2]),
                 'width': row[3],
-                'confidence': sure[name],
+                'confidence': sure[proposed],
             }
-            for name, row in parameters.get('doors', {}).items()
+            for proposed, (name, row) in zip(
+                proposal.parameters.get('doors', {}),
+                parameters.get('doors', {}).items(),
+                strict=True,
+            )
         ],
         'entrances': [
             {'wall': wall, 'room': renamed[room], 'line': parameters['walls'][wall]}
