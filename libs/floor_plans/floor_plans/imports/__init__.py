@@ -2,8 +2,8 @@
 
 `import_place` looks at the file, makes the place, writes and draws it. Read from the bottom up:
 `rmf_building` draws a level of Open-RMF's building.yaml as a map, `graphs` reads graphs of
-patrolling_sim, of Nav2's route server and of Open-RMF, `renewal` lays a newer map over an older one,
-`place_import` does the rest.
+patrolling_sim, of Nav2's route server and of Open-RMF, `renewal` lays a newer map over an older
+one, `place_import` does the rest.
 """
 
 from floor_plans.imports.graphs import SUFFIXES as SUFFIXES
