@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from indoor_watch import Event, EventState
+from indoor_watch import Event, EventState, Observation
 from strict_files.files import FileError
 from surveillance_runtime.event_log import EventLog, RecordEntry, read_all
 from surveillance_runtime.incidents import Cause, Incidents, SeenThing, Severity
@@ -51,9 +51,16 @@ class FindingTeller:
         self._told: dict[int, EventState] = {}
         self._looks: dict[int, int] = {}
         self._problem = ''
+        # Findings that were told as unverified.
+        self._unverified: set[int] = set()
 
-    def changed(self, finding: Event) -> None:
-        """Take a finding that has begun or changed its state."""
+    def changed(self, finding: Event, instead: Observation | None = None) -> None:
+        """Take a finding that has begun or changed its state.
+
+        Args:
+            finding: The finding.
+            instead: What was seen instead, where that ended it.
+        """
         cause = cause_of(finding)
         if self._told.get(finding.number) != finding.state:
             self._told[finding.number] = finding.state
@@ -62,17 +69,28 @@ class FindingTeller:
         if finding.state == EventState.ACKNOWLEDGED:
             self._incidents.acknowledge(cause, PERSON)
         elif finding.state != EventState.OPEN:
-            self._incidents.end(cause, finding.words())
+            self._incidents.end(cause, finding.ending(instead))
 
     def alert(self, finding: Event) -> None:
         """Take that people are to be called for a finding, if they are not yet."""
         # Told once: each look sees the middle of a thing elsewhere by some centimetres.
-        if cause_of(finding) in self._incidents.open():
+        is_told = cause_of(finding) in self._incidents.open()
+        if is_told and finding.number not in self._unverified:
             return
+        self._unverified.discard(finding.number)
+        self._begin(finding, finding.rule, Severity.ALARM)
+
+    def warn(self, finding: Event) -> None:
+        """Take that one look alone says so, and nobody could look again: nobody is called."""
+        if cause_of(finding) not in self._incidents.open():
+            self._unverified.add(finding.number)
+            self._begin(finding, f'unverified, seen in one look; {finding.rule}', Severity.WARNING)
+
+    def _begin(self, finding: Event, why: str, severity: Severity) -> None:
         self._incidents.begin(
             cause_of(finding),
-            f'{finding.words()} ({finding.rule})',
-            Severity.ALARM,
+            f'{finding.words()} ({why})',
+            severity,
             place=finding.place,
             evidence=tuple(dict.fromkeys((*finding.evidence[:1], *finding.evidence[-1:]))),
             finding=SeenThing(
@@ -103,7 +121,8 @@ class FindingTeller:
         Args:
             book: As `EventBook.state` gives it.
         """
-        alerted = [int(each.name) for each in self._incidents.open() if each.kind == KIND]
+        told = {int(each.name) for each in self._incidents.open() if each.kind == KIND}
+        alerted = sorted(told - self._unverified)
         if self._log is None:
             return {**book, 'alerted': alerted}
         quiet = set(book['quiet'])

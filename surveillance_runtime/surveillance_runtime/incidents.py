@@ -460,6 +460,8 @@ class IncidentBook:
         if incident.calls:
             text = incident.told.text
             lasted = _span(now - incident.began)
+            if incident.told.finding is not None and not each.is_lost:
+                text = each.ending  # which says what it was, too
             ending = f': {each.ending}' if each.ending != text else ''
             all_clear = f'all clear after {lasted}: {text}{ending}'
             self._call(IncidentCall(all_clear, incident, incident.calls, over=True))

@@ -10,7 +10,7 @@ import pytest
 from indoor_watch import Event, EventBook, EventState, Kind, Observation
 from surveillance_perception.finding_teller import PERSON, FindingTeller, findings_of
 from surveillance_runtime.event_log import read
-from surveillance_runtime.incidents import Incidents, IncidentUpdate
+from surveillance_runtime.incidents import IncidentBook, Incidents, IncidentUpdate, Severity
 
 pytestmark = pytest.mark.unit
 
@@ -62,6 +62,34 @@ def test_who_takes_care_is_noted_and_the_end_comes_when_it_is_over(tmp_path: Pat
     assert told.updates[-1].acknowledged_by == PERSON
     told.see_door('closed', 30.0, visit=2)
     assert told.phases == ['begin', 'update', 'end']
+
+
+def test_what_is_unverified_is_a_warning_until_a_second_look(tmp_path: Path) -> None:
+    told = Told(tmp_path)
+    seen = Observation(Kind.PERSON, 'seen', 'E', '', None, 0.82, 1.0)
+    finding = told.book.take(seen, severity=3, rule='nobody in E', visit=1)
+    assert finding is not None
+    told.teller.warn(finding)
+    told.teller.warn(finding)
+    (warning,) = told.updates
+    assert (warning.severity, 'unverified' in warning.text) == (Severity.WARNING, True)
+    assert told.teller.kept(told.book.state())['alerted'] == [], 'nobody was called'
+    told.teller.alert(finding)
+    assert [each.severity for each in told.updates] == [Severity.WARNING, Severity.ALARM]
+    assert 'unverified' not in told.updates[-1].text
+
+
+def test_the_all_clear_says_what_it_was_once(tmp_path: Path) -> None:
+    """It read `1: door D1 is ajar in C1 (...): 1: door D1 is ajar in C1`."""
+    calls: list[str] = []
+    told, book = Told(tmp_path), IncidentBook(lambda call: calls.append(call.text), lambda _: None)
+    told.see_door('ajar', 10.0)
+    told.see_door('closed', 30.0, visit=2)
+    for update, when in zip(told.updates, (0.0, 1320.0), strict=True):
+        book.hear(update, when)
+    book.close(2000.0)
+    assert calls[0].startswith('1: door D1 is ajar in C1')
+    assert calls[1] == 'all clear after 22 min: C1: door D1 is closed again (was ajar)'
 
 
 @pytest.mark.parametrize('state', [EventState.NORMAL, EventState.FALSE])

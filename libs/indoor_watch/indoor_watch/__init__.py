@@ -5,7 +5,7 @@ the robot is; it gives `Observation`s, and joins them to `Event`s in an `EventBo
 rules come from `read_watch_file`. Time, poses and pictures are handed in; nothing here knows ROS.
 `python -m indoor_watch.demo` shows a room in which a box appears.
 
-    book = EventBook(told=lambda event: print(event.words()))
+    book = EventBook(told=lambda event, _: print(event.words()))
     monitor = ChangeMonitor(rules, book, local=datetime.fromtimestamp, robot='Robot1')
     monitor.use_map(grid)
     monitor.arrive('hall', stamp)

@@ -6,6 +6,7 @@ An alert that one look alone does not make sure waits for a second look.
 from __future__ import annotations
 
 import contextlib
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -19,6 +20,8 @@ from indoor_watch.persons import Picture
 from indoor_watch.visit import Pictured, Visit
 from indoor_watch.watch_rules import Level, WatchRule, severity_of
 
+SENT_WITHIN = 60.0
+"""Whoever was told of a picture that is replaced has sent it by then, seconds."""
 Drawn = Callable[[tuple[float, float], Visit], tuple[Picture, Picture | None] | None]
 """Draws what a lidar met around a point of the map, and what stands there normally."""
 
@@ -33,6 +36,7 @@ class Alerting:
         robot: Whose observations they are.
         tell: Called with each observation.
         alert: Called with each event of level ALERT that lasts as long as its rule wants.
+        warn: Called with each of them that nobody could look at again, where its rule wants that.
         store: Keeps pictures; None: nothing is kept.
         drawn: Draws what has no picture.
         verify_seconds: An alert that is not sure waits so long for a second look.
@@ -47,16 +51,24 @@ class Alerting:
         robot: str,
         tell: Callable[[Observation], object],
         alert: Callable[[Event], object],
+        warn: Callable[[Event], object] = lambda _: None,
         store: EvidenceStore | None,
         drawn: Drawn,
         verify_seconds: float,
     ) -> None:
         self.rules, self.book = tuple(rules), book
-        self._local, self._robot, self._tell, self._alert = local, robot, tell, alert
+        self._local, self._robot, self._tell = local, robot, tell
+        self._alert, self._warn = alert, warn
         self._store, self._drawn = store, drawn
         self._verify_seconds = verify_seconds
         self._habits = Habits()
         self._doubts: dict[int, float] = {}
+        # Events that nobody could look at again in time: told once.
+        self._given_up: set[int] = set()
+        # How bad each doubt is when nobody looks again, by its rule.
+        self._unverified: dict[int, Level] = {}
+        # Pictures that no event has any more, and since when.
+        self._replaced: deque[tuple[float, str]] = deque()
 
     def take(self, noted: Iterable[Pictured], visit: Visit) -> None:
         """Take what was noticed in a visit."""
@@ -71,7 +83,10 @@ class Alerting:
         seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=visit.at)
         self._tell(seen)
         words = '' if rule is None else rule.words()
+        before = self._pictures()
         event = self.book.take(seen, severity=severity, rule=words, visit=visit.number)
+        if evidence:
+            self._drop((before | {evidence}) - self._pictures(), seen.stamp)
         if event is None or rule is None or event.state != EventState.OPEN:
             return
         lasts = rule.lasting(event.looks, event.last - event.began)
@@ -79,8 +94,9 @@ class Alerting:
             if event.confirmed or not self._verify_seconds:
                 self._doubts.pop(event.number, None)
                 self._alert(event)
-            else:
+            elif event.number not in self._given_up:
                 self._doubts.setdefault(event.number, seen.stamp + self._verify_seconds)
+                self._unverified[event.number] = rule.unverified_level
 
     def _keep(self, pictured: Pictured, severity: int, visit: Visit) -> str:
         """Keep a picture, and return its file; empty: there is none."""
@@ -96,7 +112,21 @@ class Alerting:
         if before is not None:
             picture = side_by_side(before, picture)
         what = f'{kind}{seen.kind}-{seen.subject or seen.place}-{seen.state}'
-        return self._store.keep(picture, what, severity, seen.stamp)
+        return self._store.keep(picture, what, severity, seen.stamp, self._pictures())
+
+    def _pictures(self) -> set[str]:
+        """Return the pictures of the events that go on."""
+        return {name for each in self.book.current for name in each.evidence}
+
+    def _drop(self, names: Iterable[str], stamp: float) -> None:
+        """Delete pictures that a later one replaces, once nobody sends them any more."""
+        if self._store is None:
+            return
+        self._replaced += [(stamp, each) for each in names]
+        while self._replaced and not 0.0 <= stamp - self._replaced[0][0] < SENT_WITHIN:
+            _, name = self._replaced.popleft()
+            if name not in self._pictures():
+                self._store.delete(name)
 
     def end(self, numbers: Iterable[int], stamp: float) -> None:
         """Take that what made some events is seen no more."""
@@ -106,16 +136,23 @@ class Alerting:
     def doubts(self, stamp: float) -> list[Event]:
         """Return the alerts that wait until the robot has looked again.
 
-        One that nobody could look at again in time is told as it is; so is one whose time is no
-        longer known, for the clock was set back.
+        One that nobody could look at again in time is told as its rule says: as an alert, or as
+        unverified. So is one whose time is no longer known, for the clock was set back.
         """
+        self._given_up = {
+            number
+            for number in self._given_up
+            if (known := self.book.find(number)) is not None and known.state == EventState.OPEN
+        }
         for number, until in list(self._doubts.items()):
             event = self.book.find(number)
             if event is None or event.state != EventState.OPEN:
                 del self._doubts[number]
             elif not until - self._verify_seconds <= stamp < until:
                 del self._doubts[number]
-                self._alert(event)
+                is_alert = self._unverified.pop(number, Level.ALERT) >= Level.ALERT
+                (self._alert if is_alert else self._warn)(event)
+                self._given_up.add(number)
         return [each for each in map(self.book.find, self._doubts) if each is not None]
 
     def state(self) -> dict[str, Any]:
@@ -124,6 +161,7 @@ class Alerting:
             'book': self.book.state(),
             'habits': self._habits.state(),
             'doubts': {str(number): until for number, until in self._doubts.items()},
+            'unverified': {str(number): int(level) for number, level in self._unverified.items()},
         }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -133,10 +171,13 @@ class Alerting:
             ValueError, KeyError, TypeError: It is something else; nothing is changed then.
         """
         doubts = {int(each): float(until) for each, until in dict(kept['doubts']).items()}
+        levels = {
+            int(each): Level(level) for each, level in dict(kept.get('unverified', {})).items()
+        }
         with restoring_all() as parts:
             parts(self._habits, kept['habits'])
             parts(self.book, kept['book'])
-        self._doubts = doubts
+        self._doubts, self._unverified = doubts, levels
 
 
 class _Restorable(Protocol):

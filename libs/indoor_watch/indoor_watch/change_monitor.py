@@ -51,6 +51,7 @@ class ChangeMonitor:
         local: Returns the local time of a stamp.
         tell: Called with each observation.
         alert: Called with each event of level ALERT that lasts as long as its rule wants.
+        warn: Called with each of them that nobody could look at again, where its rule wants that.
         doors: The doors' openings by name, map frame, metres.
         robot: Whose observations they are.
         markers: The ids that hang here, and where, map frame, metres; None: that is learned. Empty:
@@ -77,6 +78,7 @@ class ChangeMonitor:
         robot: str,
         tell: Callable[[Observation], object] = lambda _: None,
         alert: Callable[[Event], object] = lambda _: None,
+        warn: Callable[[Event], object] = lambda _: None,
         doors: Mapping[str, Segment] | None = None,
         markers: Mapping[int, tuple[float, float, float] | None] | None = None,
         rooms: Rooms | None = None,
@@ -103,6 +105,7 @@ class ChangeMonitor:
             robot=robot,
             tell=tell,
             alert=alert,
+            warn=warn,
             store=store,
             drawn=self._floor.drawn,
             verify_seconds=verify_seconds,

@@ -51,7 +51,7 @@ class Event:
         looks: In how many visits it was seen.
         confidence: That at least one of its sightings was right.
         robots: Who saw it.
-        evidence: Of the first and the last sighting.
+        evidence: Of the first sighting, the surest and the last one, as far as these differ.
         compared_with: What the last sighting was compared with; or empty.
         seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
         confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another visit,
@@ -86,6 +86,21 @@ class Event:
         at = '' if self.position is None or self.subject else ' at {:.1f}, {:.1f}'
         return f'{self.number}: {seen.words()}{at.format(*(self.position or ()))}'
 
+    def ending(self, instead: Observation | None) -> str:
+        """Say what ended it, and what it was, as 'R3: door D3 is open again (was closed)'.
+
+        Args:
+            instead: What was seen instead; None: it was seen no more, or a person has answered.
+        """
+        where = f'{self.place}: ' if self.place else ''
+        if instead is not None:
+            said = instead.kind.words(instead.state, instead.subject)
+            return f'{where}{said} again (was {self.seen})'
+        said = self.kind.words(self.seen, self.subject)
+        if self.state == EventState.OVER:
+            return f'{where}it is seen no more that {said}'
+        return f'{where}{said}: a person calls it {self.state}'
+
     def to_json(self) -> dict[str, Any]:
         """Return it as plain values."""
         return asdict(self)
@@ -113,10 +128,15 @@ class EventBook:
 
     Args:
         most: How many are kept.
-        told: Called with each event that begins or changes its state.
+        told: Called with each event that begins or changes its state, and with what was seen
+            instead where that ended it, else None.
     """
 
-    def __init__(self, most: int = 2000, told: Callable[[Event], object] = lambda _: None) -> None:
+    def __init__(
+        self,
+        most: int = 2000,
+        told: Callable[[Event, Observation | None], object] = lambda _event, _instead: None,
+    ) -> None:
         self._most = most
         self._told = told
         self._events: dict[int, Event] = {}
@@ -127,6 +147,8 @@ class EventBook:
         self._normal: dict[_Key, list[Observation]] = {}
         self._next = 1
         self._visits: dict[int, int] = {}
+        # Of each event the surest sighting with a picture: how sure, and the picture.
+        self._surest: dict[int, tuple[float, str]] = {}
         self._quiet: set[int] = set()
 
     @property
@@ -182,11 +204,11 @@ class EventBook:
             )
             self._next += 1
             self._visits[event.number] = visit
+            self._surest[event.number] = seen.confidence, seen.evidence
             self._keep(event)
             return event
         new_visit = self._visits.get(event.number) != visit
         self._visits[event.number] = visit
-        first = event.evidence[:1]
         changed = replace(
             event,
             position=seen.position or event.position,
@@ -199,7 +221,7 @@ class EventBook:
             looks=event.looks + new_visit,
             confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
             robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
-            evidence=(*first, seen.evidence) if seen.evidence else event.evidence,
+            evidence=self._evidence(event, seen),
             compared_with=seen.compared_with or event.compared_with,
             confirmed=event.confirmed
             or seen.confidence >= SURE
@@ -211,6 +233,19 @@ class EventBook:
         if changed.state != EventState.OPEN:
             self._index(changed)
         return changed
+
+    def _evidence(self, event: Event, seen: Observation) -> tuple[str, ...]:
+        """Return the pictures of an event that are kept: the first, the surest, the last."""
+        if not seen.evidence:
+            return event.evidence
+        # After a restart it is not known how sure the first one was: it stays.
+        first = ''.join(event.evidence[:1])
+        sure, surest = self._surest.get(event.number, (1.0, first))
+        if seen.confidence > sure or not surest:
+            self._surest[event.number] = seen.confidence, seen.evidence
+            surest = seen.evidence
+        kept = (first, surest, seen.evidence)
+        return tuple(dict.fromkeys(each for each in kept if each))
 
     def answer(self, number: int, state: EventState) -> Event:
         """Take a person's word: acknowledged, normal from now on, or a false alarm.
@@ -289,7 +324,7 @@ class EventBook:
         self._normal, self._next = {}, following
         for each in normal:
             self._normal.setdefault(_key(each), []).append(each)
-        self._visits, self._quiet = {}, quiet
+        self._visits, self._surest, self._quiet = {}, {}, quiet
         self._current, self._over = {}, []
         for event in events:
             self._index(event)
@@ -300,10 +335,10 @@ class EventBook:
         numbers = sorted(number for some in self._current.values() for number in some)
         return [self._events[number] for number in numbers]
 
-    def _keep(self, event: Event) -> None:
+    def _keep(self, event: Event, instead: Observation | None = None) -> None:
         self._events[event.number] = event
         self._index(event)
-        self._told(event)
+        self._told(event, instead)
         while len(self._events) > self._most and self._over:
             severity, last, number = heapq.heappop(self._over)
             least = self._events.get(number)
@@ -315,6 +350,7 @@ class EventBook:
             del self._events[number]
             self._quiet.discard(number)
             self._visits.pop(number, None)
+            self._surest.pop(number, None)
             self._current.get(_key(least), set()).discard(number)
 
     def _index(self, event: Event) -> None:
@@ -348,7 +384,7 @@ class EventBook:
             if not _ends(each, seen) or seen.stamp <= each.last:
                 continue
             if each.state in _GOING_ON:
-                self._keep(replace(each, state=EventState.OVER, last=seen.stamp))
+                self._keep(replace(each, state=EventState.OVER, last=seen.stamp), seen)
             self._quiet.discard(each.number)
             self._index(self._events[each.number])
 

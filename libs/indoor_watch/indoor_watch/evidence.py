@@ -1,12 +1,15 @@
 """Pictures and sweeps that show what was seen, in a folder that does not grow beyond its bounds.
 
-The least severe goes first, and of like severity the oldest: a file's name says both.
+What no event needs that goes on goes first, of that the least severe, and of like severity the
+oldest: a file's name says both. Its owner alone reads them.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import re
+from collections.abc import Collection
 from itertools import chain, count
 from pathlib import Path
 
@@ -50,12 +53,19 @@ class EvidenceStore:
         self._folder = folder
         self._days = most_days
         self._most = most_bytes
-        folder.mkdir(parents=True, exist_ok=True)
+        private_folder(folder)
         self._sizes = {
             each.name: each.stat().st_size for each in folder.iterdir() if _NAME.match(each.name)
         }
 
-    def keep(self, picture: NDArray[np.uint8], what: str, severity: int, stamp: float) -> str:
+    def keep(
+        self,
+        picture: NDArray[np.uint8],
+        what: str,
+        severity: int,
+        stamp: float,
+        needed: Collection[str] = (),
+    ) -> str:
         """Write a picture and return its name; empty where it cannot be written.
 
         Args:
@@ -63,6 +73,7 @@ class EvidenceStore:
             what: Part of the name, of letters, digits and dashes.
             severity: 0 to 9; higher is kept longer.
             stamp: Seconds since 1970.
+            needed: What shows what goes on: it goes last.
         """
         what = re.sub(r'[^A-Za-z0-9-]', '-', what)[:40]
         stem = f'{min(max(severity, 0), 9)}_{max(0, round(1000 * stamp)):013d}_{what}'
@@ -73,11 +84,12 @@ class EvidenceStore:
         if not good:
             return ''
         try:
-            (self._folder / name).write_bytes(data.tobytes())
+            write_private(self._folder / name, data.tobytes())
         except OSError:
+            self._delete(name)
             return ''  # the disk is full: what was seen counts without a picture
         self._sizes[name] = len(data)
-        self._prune(stamp)
+        self._prune(stamp, needed)
         return name if name in self._sizes else ''
 
     @property
@@ -100,14 +112,41 @@ class EvidenceStore:
         with contextlib.suppress(OSError):
             (self._folder / name).unlink(missing_ok=True)
 
-    def _prune(self, stamp: float) -> None:
+    def delete(self, name: str) -> None:
+        """Delete a picture, if it is there."""
+        if self._sizes.pop(name, None) is not None:
+            self._delete(name)
+
+    def _prune(self, stamp: float, needed: Collection[str]) -> None:
         self.forget_old(stamp)
         total = self.total
-        for name in sorted(self._sizes, key=lambda each: (each[0], each[2:15])):
+        for name in sorted(self._sizes, key=lambda each: (each in needed, each[0], each[2:15])):
             if total <= self._most:
                 return
             total -= self._sizes.pop(name)
             self._delete(name)
+
+
+def private_folder(folder: Path) -> None:
+    """Make a folder, if it is missing, that its owner alone reads: faces are in its pictures.
+
+    Raises:
+        OSError: It cannot be made.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    # One that is another user's is as it is.
+    with contextlib.suppress(PermissionError):
+        folder.chmod(0o700)
+
+
+def write_private(path: Path, data: bytes) -> None:
+    """Write a file that its owner alone reads.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), 'wb') as file:
+        file.write(data)
 
 
 def oldest(stamp: float, days: float) -> int:

@@ -16,6 +16,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from indoor_watch.evidence import private_folder, write_private
 from indoor_watch.views import WIDTH, Picture
 
 Box = tuple[int, int, int, int]
@@ -144,8 +145,9 @@ class ReferenceViews:
         if self._folder is not None:
             good, data = cv2.imencode('.png', picture)
             try:
-                self._folder.mkdir(parents=True, exist_ok=True)
-                self._path(self._folder, view.name).write_bytes(data.tobytes() if good else b'')
+                private_folder(self._folder)
+                path = self._path(self._folder, view.name)
+                write_private(path, data.tobytes() if good else b'')
             except OSError:
                 pass  # the disk is full: after a restart this viewpoint is seen anew
         return view

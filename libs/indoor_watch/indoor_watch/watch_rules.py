@@ -51,7 +51,7 @@ class Level(IntEnum):
 
 
 ALL = ('all', 'any', 'every')
-KEYS = ('is', 'places', 'hours', 'persistence', 'severity', 'confidence')
+KEYS = ('is', 'places', 'hours', 'persistence', 'severity', 'confidence', 'unverified')
 ALWAYS = WeeklyHours.parse('daily 00:00-24:00')
 
 
@@ -69,6 +69,8 @@ class WatchRule:
         seconds: For how long it must have been seen otherwise.
         level: How bad it is otherwise.
         confidence: Observations below it do not count.
+        unverified: How bad it is when one look alone says so, and nobody could look again in time;
+            None: a person in one picture is a WARNING, as a picture may deceive; all else as level.
     """
 
     kind: Kind
@@ -80,6 +82,14 @@ class WatchRule:
     seconds: float = 0.0
     level: Level = Level.ALERT
     confidence: float = 0.6
+    unverified: Level | None = None
+
+    @property
+    def unverified_level(self) -> Level:
+        """How bad it is when nobody could look again."""
+        if self.unverified is not None:
+            return self.unverified
+        return min(self.level, Level.WARNING) if self.kind == Kind.PERSON else self.level
 
     def broken_by(self, seen: Observation, moment: datetime) -> bool:
         """Tell whether an observation is otherwise than this rule wants, at a local time."""
@@ -118,7 +128,10 @@ class WatchRule:
             lasting = f', seen in {self.looks} looks'
         elif self.seconds:
             lasting = f', seen for {self.seconds:g} s'
-        return f'{when} {wrong}{where}{lasting} is {_article(self.level)} {self.level.name}'
+        said = f'{when} {wrong}{where}{lasting} is {_article(self.level)} {self.level.name}'
+        if self.unverified is not None:
+            said += f', unverified {_article(self.unverified)} {self.unverified.name}'
+        return said
 
 
 def read_watch_file(
@@ -184,6 +197,7 @@ def rule_from(
         seconds,
         _level(entry.get('severity', 'alert')),
         _confidence(entry.get('confidence', 0.6)),
+        _level(entry['unverified'], 'unverified') if 'unverified' in entry else None,
     )
 
 
@@ -244,14 +258,12 @@ def _persistence(value: Any) -> tuple[int, float]:
     return 1, number
 
 
-def _level(value: Any) -> Level:
+def _level(value: Any, key: str = 'severity') -> Level:
     try:
         return Level[str(value).upper()]
     except KeyError:
         names = [each.name.lower() for each in Level]
-        raise ValueError(
-            f'severity: got {value!r}, expected {nearest(str(value), names)}'
-        ) from None
+        raise ValueError(f'{key}: got {value!r}, expected {nearest(str(value), names)}') from None
 
 
 def _confidence(value: Any) -> float:

@@ -155,7 +155,7 @@ def test_what_is_normal_is_so_at_its_place_and_in_its_state(
 
 def test_of_what_is_over_the_least_severe_and_oldest_goes_first() -> None:
     told: list[int] = []
-    book = EventBook(most=3, told=lambda event: told.append(event.number))
+    book = EventBook(most=3, told=lambda event, _: told.append(event.number))
     for number, severity in enumerate((3, 1, 2, 1, 3)):
         event = take(book, replace(THING, position=(9.0 * number, 0.0), stamp=number), severity)
         assert book.end(event.number, float(number)) is not None

@@ -28,7 +28,7 @@ def take(book: EventBook, observation: Observation, severity: int = 2, look: int
 
 def test_sightings_of_one_thing_are_one_event():
     told: list[Event] = []
-    book = EventBook(told=told.append)
+    book = EventBook(told=lambda event, _: told.append(event))
     take(book, seen(evidence='a.jpg'))
     take(book, seen(position=(1.3, 2.2), stamp=101.0, evidence='b.jpg'))
     event = take(book, seen(stamp=160.0, robot='robot2', evidence='c.jpg'), look=2)

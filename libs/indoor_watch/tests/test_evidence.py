@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
@@ -90,8 +91,7 @@ def test_a_full_disk_costs_the_picture_alone(tmp_path: Path, monkeypatch: pytest
     def full(*_: object) -> None:
         raise OSError(28, 'No space left on device')
 
-    monkeypatch.setattr(Path, 'write_bytes', full)
-    monkeypatch.setattr(Path, 'write_text', full)
+    monkeypatch.setattr(os, 'fdopen', full)
     assert store.keep(PLAIN, 'b', 1, NOW) == ''
     assert names(tmp_path) == []
     assert store.total == 0

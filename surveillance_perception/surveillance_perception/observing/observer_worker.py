@@ -70,6 +70,7 @@ class ObserverWorker:
             local=datetime.fromtimestamp,
             tell=self._on_observation,
             alert=teller.alert,
+            warn=teller.warn,
             robot=robot,
             doors=doors,
             markers=settings.known_markers(),
