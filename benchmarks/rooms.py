@@ -33,9 +33,8 @@ from skimage.segmentation import watershed
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser
-from floor_plans import Grid
 from floor_plans.map_rooms import propose, segment
-from floor_plans.occupancy_map import OccupancyMap
+from floor_plans.occupancy_map import OccupancyMap, read_map
 
 FREE = 205
 RADIUS = 0.22
@@ -47,17 +46,20 @@ Labels = NDArray[np.int32]
 
 
 def ours(image: Image, resolution: float) -> Labels:
-    """Return the project's rooms of a picture, in the picture's order of rows."""
-    cells = occupancy(image)[::-1]
-    return segment(Grid(np.ascontiguousarray(cells), resolution)).labels[::-1]
+    """Return the project's rooms of a picture, in the picture's order of rows: as people get it."""
+    building = as_map(image, resolution)
+    try:
+        return propose(building, RADIUS).segmentation.labels[::-1]
+    except ValueError:  # so small that no robot fits
+        return segment(building.own_grid).labels[::-1]
 
 
-def occupancy(image: Image) -> NDArray[np.int8]:
-    """Return the cells of a picture."""
-    cells = np.full(image.shape, -1, np.int8)
-    cells[image > FREE] = 0
-    cells[image < 255 * 0.35] = 100
-    return cells
+def as_map(image: Image, resolution: float = 0.05) -> OccupancyMap:
+    """Return a picture as the command `import` reads it."""
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / 'map.png'
+        cv2.imwrite(str(picture), image)
+        return read_map(picture, resolution=resolution)
 
 
 def true_doors(image: Image, drawn: Image, truth: Labels) -> list[NDArray[np.float64]]:
@@ -79,8 +81,7 @@ def true_doors(image: Image, drawn: Image, truth: Labels) -> list[NDArray[np.flo
 
 def door_scores(image: Image, drawn: Image, truth: Labels) -> tuple[int, int, int, int]:
     """Return how many true doors there are and are found, how many proposed and how many false."""
-    building = OccupancyMap(Path('map.yaml'), occupancy(image), 0.05, (0.0, 0.0, 0.0))
-    placed = propose(building, RADIUS).parameters.get('doors', {})
+    placed = propose(as_map(image), RADIUS).parameters.get('doors', {})
     own = np.array([row[:2] for row in placed.values()]).reshape(-1, 2) / 0.05
     own[:, 1] = image.shape[0] - own[:, 1]
     lines = true_doors(image, drawn, truth)

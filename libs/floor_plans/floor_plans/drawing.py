@@ -120,7 +120,7 @@ class _Picture:
     def floors(self, run: DrivenRun | None) -> None:
         if not self._plan.is_enclosed:
             return  # where a room ends is not known
-        grid, masks = self._regions.grid, self._regions.masks()
+        grid = self._regions.grid
         longest = max(run.waits.values(), default=0.0) if run else 0.0
 
         def colour_of(name: str) -> str:
@@ -130,12 +130,14 @@ class _Picture:
 
         if self._plan.map is not None:
             # As cells: around what stands in a room, an outline has holes.
-            which = np.zeros(grid.cells.shape, np.uint16)
-            for number, mask in enumerate(masks.values(), start=1):
-                which[mask & grid.free] = number
-            self._canvas.raster(which, grid.origin, grid.resolution, list(map(colour_of, masks)))
+            labels, names = self._regions.numbers()
+            order = np.zeros(max([*names, int(labels.max()), 0]) + 1, np.uint16)
+            order[list(names)] = np.arange(1, len(names) + 1)
+            which = np.where(grid.free, order[np.maximum(labels, 0)], np.uint16(0))
+            colours = [colour_of(name) for name in names.values()]
+            self._canvas.raster(which, grid.origin, grid.resolution, colours)
             return
-        for name, mask in masks.items():
+        for name, mask in self._regions.masks().items():
             colour = colour_of(name)
             outlines = cv2.findContours(
                 mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE

@@ -379,14 +379,18 @@ def _pixels(picture: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]
                     f'{MOST_CELLS} in all'
                 )
             values = _channels(picture, opened)
+    except FileError:
+        raise
     except FileNotFoundError as error:
         there = like_file(picture)
         hint = f", expected '{there}'" if there else ''
         raise FileError(f'{picture}: {error.strerror}{hint}') from None
     except UnidentifiedImageError:
         raise FileError(f'{picture}: {_what_it_is(picture)}') from None
-    except Image.DecompressionBombError as error:
-        raise FileError(f'{picture}: {error}') from None
+    except Image.DecompressionBombError:
+        raise FileError(
+            f'{picture}: more pixels than any map has: expected at most {MOST_CELLS} in all'
+        ) from None
     except OSError as error:
         raise FileError(
             in_one_line(error) if error.errno else f'{picture}: a damaged picture: {error}'

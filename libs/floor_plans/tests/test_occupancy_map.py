@@ -214,6 +214,28 @@ def test_damaged_pictures_are_refused(tmp_path: Path) -> None:
             read_map(path)
 
 
+@pytest.mark.parametrize(
+    ('content', 'said'),
+    [
+        (b'%PDF-1.4 plan', 'a PDF (13 bytes): expected a picture'),
+        (b'', 'an empty file: expected a picture'),
+        (b'<svg width="9"/>', 'an SVG drawing (16 bytes)'),
+        (b'version https://git-lfs.github.com/spec/v1', "Git LFS's pointer to a picture"),
+        (b'P5 12000 12000 255\n', '12000 by 12000 pixels: expected at most 100000000 in all'),
+        (b'P5 90000 90000 255\n', 'more pixels than any map has: expected at most 100000000'),
+    ],
+)
+def test_what_is_no_picture_is_named_by_what_it_is(
+    tmp_path: Path, content: bytes, said: str
+) -> None:
+    path = written(tmp_path)
+    (tmp_path / 'building.pgm').write_bytes(content)
+    with pytest.raises(FileError) as caught:
+        read_map(path)
+    assert f'building.pgm: {said}' in str(caught.value)
+    assert 'damaged' not in str(caught.value)
+
+
 def test_a_map_given_as_a_place_names_the_command_that_makes_one(tmp_path: Path) -> None:
     for path in (written(tmp_path), tmp_path / 'building.pgm'):
         with pytest.raises(FileError) as caught:

@@ -40,6 +40,8 @@ def proposed(
         return Segmentation(known, int(labels.max()), frozenset(), own, known)
 
     monkeypatch.setattr(proposal, 'segment', found)
+    # The rooms are as the test has them, also where no wall parts them.
+    monkeypatch.setattr(proposal, '_without_false_doors', lambda _, rooms: rooms)
     parameters = propose(building, RADIUS).parameters
     plan = FloorPlan.from_parameters(parameters, building)
     RoomMap(plan)
@@ -93,3 +95,19 @@ def test_a_building_is_proposed_as_it_was(variant: str) -> None:
     """
     before = (proposed_places.RECORDS / f'{variant}.txt').read_text('utf-8').splitlines()
     assert proposed_places.proposed(variant) == before
+
+
+def test_a_gap_between_a_wall_and_furniture_is_no_door() -> None:
+    cells = np.zeros((120, 220), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    cells[:, 110] = 100
+    cells[50:70, 110] = 0  # the door between two rooms
+    behind_wall = OccupancyMap(Path('map.yaml'), cells[::-1].copy(), 0.05, (0.0, 0.0, 0.0))
+    assert len(propose(behind_wall, RADIUS).names) == 2
+    # Cupboards 1 m deep leave 1.25 m to the west wall, and a niche of 3 m2 behind.
+    cells[22:42, 26:48] = 100
+    cells[1:22, 34:48] = 100
+    with_cupboard = OccupancyMap(Path('map.yaml'), cells[::-1].copy(), 0.05, (0.0, 0.0, 0.0))
+    found = propose(with_cupboard, RADIUS)
+    assert len(found.names) == 2
+    assert list(found.parameters['doors']) == ['D1']

@@ -49,6 +49,14 @@ _BESIDE_DOOR = 0.3
 """An opening is a known door if their middles are at most so far apart, metres."""
 
 
+_SEPARATE_ENOUGH = 2.0
+"""From this area on, in squares of the door's width, a room is one whatever stands at its door."""
+_DEEP = 0.75
+"""What is deeper than this beside a door, across it, is no wall, metres."""
+_LIFT = 2.0
+"""The smallest room behind a door, m^2: a lift for a wheelchair has 1.1 x 1.4 m and its walls."""
+_PASSES = 6
+_STEP = 0.05
 _PAPER = 0.6
 """Share of the map's edge from which on free floor there is outside, as that of a scanned plan."""
 _AT_EDGE = 0.02
@@ -159,6 +167,7 @@ def propose(
     free = grid.free
     clearance = distance_to(~free, grid.resolution)
     floor = _Floor(building, radius, known, scale, free, clearance, with_outside)
+    found = _without_false_doors(floor, found)
     for _ in range(found.rooms):
         layout = _laid_out(floor, found)
         pair = layout.one_room or _not_parted(floor, layout)
@@ -264,18 +273,22 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     near = _beside(floor, [*lines, *walls])
     positions: dict[str, list[float]] = {}
     one_room = None
+    boxes = _boxes(labels)
     for number in sorted(rooms):
-        mask = labels == number
-        inside = mask & ~near
-        if len(rooms) > 1 and not (inside & reach).any():
+        box = boxes[number]  # a building has hundreds of rooms: each is looked at alone
+        mask = labels[box] == number
+        inside = mask & ~near[box]
+        if len(rooms) > 1 and not (inside & reach[box]).any():
             # So small that the lines of its doors fill it.
             beside = [each.rooms for each in ways if number in each.rooms]
             one_room = one_room or beside[0]
             inside = mask
-        cell = point_in(inside, reach, clearance, radius)
-        positions[names[number]] = _rounded(floor.world([cell])[0])
+        column, row = point_in(inside, reach[box], clearance[box], radius)
+        at = (column + box[1].start, row + box[0].start)
+        positions[names[number]] = _rounded(floor.world([at])[0])
     points = list(positions.values())
-    points += [floor.world([_widest(labels == number, clearance)])[0] for number in outside]
+    beyond = [_widest(labels, number, boxes[number], clearance) for number in outside]
+    points += [floor.world([at])[0] for at in beyond]
     walls += _gaps(floor, found, [*lines, *walls], points)
     station, home = _station(floor.building, labels, reach & ~near, rooms, names, positions, scale)
     parameters: dict[str, Any] = {
@@ -327,11 +340,21 @@ def outside_of(found: Segmentation) -> frozenset[int]:
     return outer if set(range(1, found.rooms + 1)) - outer else frozenset()
 
 
-def _widest(mask: Mask, clearance: NDArray[np.float32]) -> Point:
+def _boxes(labels: Labels) -> dict[int, tuple[slice, slice]]:
+    """Return the rows and columns that each number's cells lie in."""
+    from scipy import ndimage  # takes 0.2 s: most only show a place
+
+    found = ndimage.find_objects(labels)
+    return {number: (box[0], box[1]) for number, box in enumerate(found, start=1) if box}
+
+
+def _widest(
+    labels: Labels, number: int, box: tuple[slice, slice], clearance: NDArray[np.float32]
+) -> Point:
     """Return the cell of a part that is farthest from what stands there, column and row."""
-    cells = np.argwhere(mask)
-    row, column = cells[np.argmax(clearance[cells[:, 0], cells[:, 1]])]
-    return float(column), float(row)
+    cells = np.argwhere(labels[box] == number)
+    row, column = cells[np.argmax(clearance[box][cells[:, 0], cells[:, 1]])]
+    return float(column + box[1].start), float(row + box[0].start)
 
 
 def _left_out(
@@ -349,14 +372,17 @@ def _left_out(
     areas = np.bincount(labels.ravel(), minlength=found.rooms + 1) * cell
     needed = floor.radius + 1.5 * found.working.resolution
 
-    def part(number: int, mask: Mask, reason: str, area: float) -> LeftOut:
-        x, y = _rounded(floor.world([_widest(mask, clearance)])[0])
-        return LeftOut(number, reason, round(float(area), 2), (x, y))
+    boxes = _boxes(labels)
+
+    def part(number: int, reason: str) -> LeftOut:
+        x, y = _rounded(floor.world([_widest(labels, number, boxes[number], clearance)])[0])
+        return LeftOut(number, reason, round(float(areas[number]), 2), (x, y))
 
     others = sorted(set(range(1, found.rooms + 1)) - rooms - outside)
 
     def why(number: int) -> str:
-        if float(clearance[labels == number].max()) <= floor.radius:
+        box = boxes[number]
+        if float(clearance[box][labels[box] == number].max()) <= floor.radius:
             return f'too narrow for a robot {2 * floor.radius:g} m wide'
         # Rooms that lead into each other have their way in together.
         mine = {number}
@@ -378,15 +404,70 @@ def _left_out(
         from_outside = any(outside & set(each.rooms) for each in ways)
         return 'reached from outside alone' if from_outside else 'no door: walls all around'
 
-    left = [part(each, labels == each, OUTSIDE, areas[each]) for each in sorted(outside)]
-    left += [part(each, labels == each, why(each), areas[each]) for each in others]
+    left = [part(each, OUTSIDE) for each in sorted(outside)]
+    left += [part(each, why(each)) for each in others]
     pieces, stats = cv2.connectedComponentsWithStats(
         (floor.free & (labels == 0)).astype(np.uint8), connectivity=4
     )[1:3]
-    for piece in range(1, len(stats)):
-        if (area := float(stats[piece, cv2.CC_STAT_AREA]) * cell) >= _DUST:
-            left.append(part(0, pieces == piece, f'smaller than {SMALLEST_ROOM:g} m2', area))
+    for piece, (west, low, wide, high, cells) in enumerate(stats.tolist()):
+        if piece and cells * cell >= _DUST:
+            box = (slice(low, low + high), slice(west, west + wide))
+            at = _rounded(floor.world([_widest(pieces, piece, box, clearance)])[0])
+            reason = f'smaller than {SMALLEST_ROOM:g} m2'
+            left.append(LeftOut(0, reason, round(cells * cell, 2), (at[0], at[1])))
     return tuple(left)
+
+
+def _without_false_doors(floor: _Floor, found: Segmentation) -> Segmentation:
+    """Return the rooms with those joined between which furniture stands, and no wall.
+
+    A cupboard beside a wall leaves a gap as wide as a door. What tells them apart: behind a door
+    there is a room, many times as large as a square on the door (`_SEPARATE_ENOUGH`), or what ends
+    at the door on both sides is as thin as a wall is (`_DEEP`). What is smaller than a lift
+    (`_LIFT`) is no room in either case. Closets and lifts behind doors in walls stay.
+    """
+    cell, grid = floor.scale**2, found.working
+    for _ in range(_PASSES):
+        areas = np.bincount(found.working_labels.ravel(), minlength=found.rooms + 1) * cell
+        needed = floor.radius + 1.5 * grid.resolution
+        widest: dict[int, tuple[float, tuple[int, int]]] = {}
+        for each in _openings(found.working_labels, floor.free, floor.clearance, needed + _SPARE):
+            if each.clearance <= needed:
+                continue
+            ends = (np.array([each.start, each.end, each.middle]) + 0.5) * floor.scale
+            line = _line(ends, floor.scale)
+            room = min(each.rooms, key=areas.__getitem__)
+            smaller = float(areas[room])
+            is_false = smaller < _LIFT or (
+                smaller < _SEPARATE_ENOUGH * line[3] ** 2
+                and max(_depth_at(floor, line, side) for side in (-1.0, 1.0)) > _DEEP
+            )
+            if is_false:
+                widest[room] = max(widest.get(room, (0.0, each.rooms)), (line[3], each.rooms))
+        if not widest:
+            break
+        # Each with one other, then all is looked at anew: it may be large enough now.
+        found = found.all_joined([pair for _, pair in widest.values()])
+    return found
+
+
+def _depth_at(floor: _Floor, door: list[float], side: float) -> float:
+    """Return how deep what stands beside a door is, across the door's direction, metres.
+
+    The least of four lines across it, which begin 0.1 to 0.4 m behind the jamb and reach 1 m to
+    both sides. The door is in the frame of the map's corner.
+    """
+    x, y, yaw, width = door
+    along, across = (math.cos(yaw), math.sin(yaw)), (-math.sin(yaw), math.cos(yaw))
+    behind = side * (width / 2 + np.array([0.1, 0.2, 0.3, 0.4]))[:, None]
+    beside = np.arange(-1.0, 1.0 + 1e-9, _STEP)[None, :]
+    columns = np.floor((x + behind * along[0] + beside * across[0]) / floor.scale).astype(int)
+    rows = np.floor((y + behind * along[1] + beside * across[1]) / floor.scale).astype(int)
+    inside = (rows >= 0) & (rows < floor.free.shape[0])
+    inside &= (columns >= 0) & (columns < floor.free.shape[1])
+    solid = np.ones(inside.shape, np.bool_)
+    solid[inside] = ~floor.free[rows[inside], columns[inside]]
+    return float(solid.sum(axis=1).min()) * _STEP
 
 
 def _not_parted(floor: _Floor, layout: _Layout) -> tuple[int, int] | None:

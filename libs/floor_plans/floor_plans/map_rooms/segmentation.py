@@ -82,6 +82,17 @@ class Segmentation:
             working_labels=numbers[self.working_labels],
         )
 
+    def all_joined(self, pairs: Sequence[tuple[int, int]]) -> Segmentation:
+        """Return the rooms with those of each pair made one; the numbers are those of now."""
+        found = self
+        now = list(range(self.rooms + 1))
+        for first, second in pairs:
+            keeps, goes = sorted((now[first], now[second]))
+            if keeps != goes:
+                found = found.joined(keeps, goes)
+                now = [keeps if n == goes else n - (n > goes) for n in now]
+        return found
+
 
 def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
     """Return the rooms of a map.
