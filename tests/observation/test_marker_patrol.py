@@ -50,7 +50,7 @@ def camera_pose(x: float, y: float, yaw: float, height: float) -> np.ndarray:
     """Return the pose (4, 4) of a camera that looks along the floor."""
     cosine, sine = math.cos(yaw), math.sin(yaw)
     pose = np.eye(4)
-    pose[:3, :3] = [[sine, 0, cosine], [-cosine, 0, sine], [0, -1, 0]]
+    pose[:3, :3] = np.array([[sine, 0.0, cosine], [-cosine, 0.0, sine], [0.0, -1.0, 0.0]])
     pose[:3, 3] = x, y, height
     return pose
 

@@ -31,6 +31,7 @@ def standing(doubt=(0.05, 0.02), joints=None, at: float = 0.0) -> CameraTracker:
 def test_without_joints_the_camera_looks_ahead():
     tracker = standing(at=0.5)
     viewpoint = tracker.viewpoint(1.5, 1.5)
+    assert viewpoint is not None
     assert viewpoint == (1.0, 2.0, 0.5)
     assert tracker.bearing_of(viewpoint) == 0.5
     assert tracker.camera_at(viewpoint) is None, 'nobody knows how it is mounted'
@@ -39,6 +40,7 @@ def test_without_joints_the_camera_looks_ahead():
 def test_with_an_arm_it_is_known_where_on_the_map_the_camera_is_and_how_sure_that_is():
     tracker = standing(joints=dict(zip(ARM.names, ARM.home, strict=True)))
     viewpoint = tracker.viewpoint(1.5, 1.5)
+    assert viewpoint is not None
     assert viewpoint == pytest.approx((1.0, 2.0, 0.0, *ARM.home))
     assert tracker.camera_at(viewpoint) is None, 'the lens is not known'
     assert tracker.angle is None

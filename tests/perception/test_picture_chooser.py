@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from indoor_watch.hung_markers import SeenMarker
 from indoor_watch.lost_sight import NO_POSE, UNREAD
 from surveillance_perception.observing.base_history import BaseHistory
@@ -16,6 +18,7 @@ from surveillance_perception.observing.picture_chooser import (
 )
 
 NOW = 100.0
+NOWHERE = np.zeros((0, 0))
 
 
 def chooser(stands: bool = True) -> PictureChooser:
@@ -47,7 +50,7 @@ def test_the_newest_picture_of_a_camera_that_stands_is_looked_at_and_then_none_f
 
 
 def test_what_was_read_in_a_picture_is_waited_for_but_not_for_ever():
-    chooser_, seen = chooser(), SeenMarker(14, 0.2, None, None, None)
+    chooser_, seen = chooser(), SeenMarker(14, 0.2, None, NOWHERE, NOWHERE)
     chooser_.take(picture(4.0), NOW)
     assert chooser_.next(NOW, is_detected=True) is None
     chooser_.take_markers(4.0, (seen,))
@@ -69,7 +72,7 @@ def test_a_picture_in_passing_is_looked_at_when_none_of_a_camera_that_stands_com
 
 
 def test_a_picture_that_came_twice_counts_once_and_a_shared_stamp_tells_no_markers():
-    chooser_, seen = chooser(), SeenMarker(14, 0.2, None, None, None)
+    chooser_, seen = chooser(), SeenMarker(14, 0.2, None, NOWHERE, NOWHERE)
     chooser_.take(picture(5.0, b'1'), NOW)
     chooser_.take(picture(5.0, b'1'), NOW)
     chooser_.take_markers(5.0, (seen,))
