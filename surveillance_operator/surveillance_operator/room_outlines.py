@@ -19,6 +19,7 @@ from floor_plans.occupancy_grid import (
     OCCUPIED,
     Box,
     distance_to,
+    divided,
     drawn_lines,
 )
 from floor_plans.shapes import Segment
@@ -57,22 +58,20 @@ def room_outlines(
     coarse = _coarse(grid)
     across = drawn_lines(coarse, list(doors.values())).astype(np.uint8)
     free = coarse.free & (cv2.dilate(across, np.ones((3, 3), np.uint8)) == 0)
-    _, parts, boxes, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4)
-    owners: dict[int, list[str]] = {}
-    for name, point in sorted(positions.items()):
-        if part := coarse.at(parts, *point):
-            owners.setdefault(part, []).append(name)
+    parted = Grid(np.where(free, FREE, OCCUPIED).astype(np.int8), coarse.resolution, coarse.origin)
+    placed = {name: at for name, at in sorted(positions.items()) if coarse.at(free, *at)}
+    labels = divided(parted, list(placed.values()))
     found = {}
-    for part, names in owners.items():
-        # Only the part's own box is looked at: a map may have hundreds.
-        left, bottom, columns, rows = boxes[part, :4].tolist()
-        mask = parts[bottom : bottom + rows, left : left + columns] == part
-        own = Grid(mask.astype(np.int8), coarse.resolution, coarse.box(bottom, left, 0, 0)[:2])
-        cells = [coarse.cell_of(*positions[name]) for name in names]
-        inside = [(row - bottom, column - left) for row, column in cells]
-        nearest = _nearest(mask, inside)
-        for number, name in enumerate(names):
-            found[name] = _outline(mask & (nearest == number), inside[number], own)
+    for number, (name, at) in enumerate(placed.items(), start=1):
+        mask = (labels == number) & free
+        # Only the room's own box is looked at: a map may have hundreds.
+        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+        bottom, left = int(rows[0]), int(columns[0])
+        own = mask[bottom : rows[-1] + 1, left : columns[-1] + 1]
+        row, column = coarse.cell_of(*at)
+        corner = coarse.box(bottom, left, 0, 0)[:2]
+        within = Grid(own.astype(np.int8), coarse.resolution, corner)
+        found[name] = _outline(own, (row - bottom, column - left), within)
     return found
 
 
@@ -83,13 +82,6 @@ def _coarse(grid: Grid) -> Grid:
     blocks = grid.free[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor)
     cells = np.where(blocks.all(axis=(1, 3)), FREE, OCCUPIED).astype(np.int8)
     return Grid(cells, grid.resolution * factor, grid.origin)
-
-
-def _nearest(mask: NDArray[np.bool_], cells: list[tuple[int, int]]) -> NDArray[np.intp]:
-    rows, columns = np.indices(mask.shape)
-    distances = [np.hypot(rows - row, columns - column) for row, column in cells]
-    nearest: NDArray[np.intp] = np.argmin(distances, axis=0)
-    return nearest
 
 
 def _outline(mask: NDArray[np.bool_], cell: tuple[int, int], grid: Grid) -> RoomOutline:

@@ -266,6 +266,62 @@ def regions(free: NDArray[np.bool_]) -> NDArray[np.int32]:
     return found
 
 
+LARGE_PART = 1.0
+"""A part of the floor from this size on that no point lies in is no part of a room, m^2."""
+
+
+def divided(grid: Grid, points: Sequence[Point]) -> NDArray[np.int32]:
+    """Return each cell's room on a map whose doors are drawn as walls, by a point in each room.
+
+    What is free falls into connected parts. A part is the room whose point lies in it, and where
+    several do (no door is drawn between them) each of its cells is that of the nearest. What is not
+    free, and a small part with no point, as the floor below a table, belongs to the nearest room.
+
+    Args:
+        grid: The map.
+        points: Of the rooms, x and y in metres; one that is not on free floor counts for the part
+            nearest to it, one off the map for none.
+
+    Returns:
+        Shape of the map: the number of the room, from 1; below 0 in a large part without a point,
+        a number for each.
+    """
+    import cv2
+
+    free = grid.free
+    count, parts, stats, _ = cv2.connectedComponentsWithStats(
+        free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
+    )
+    if count < 2:
+        return np.zeros(free.shape, np.int32)
+    everywhere = parts if free.all() else regions(free)
+    inside: dict[int, list[int]] = {}
+    for number, (x, y) in enumerate(points, start=1):
+        if (part := grid.at(everywhere, x, y)) is not None:
+            inside.setdefault(part, []).append(number)
+    number_of_part = np.zeros(count, np.int32)
+    large = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] * grid.resolution**2 >= LARGE_PART)
+    number_of_part[large] = -large
+    number_of_part[0] = 0
+    for part, numbers in inside.items():
+        number_of_part[part] = numbers[0]
+    labels: NDArray[np.int32] = number_of_part[parts]
+    for part, numbers in inside.items():
+        if len(numbers) > 1:
+            cells = np.argwhere(parts == part)
+            away = [np.hypot(*(grid.centres_of(cells) - points[n - 1]).T) for n in numbers]
+            labels[cells[:, 0], cells[:, 1]] = np.array(numbers)[np.argmin(away, axis=0)]
+    known = labels != 0
+    if not known.any():
+        return labels
+    nearest = cv2.distanceTransformWithLabels(
+        (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )[1]
+    seeds = np.zeros(int(nearest.max()) + 1, np.int32)
+    seeds[nearest[known]] = labels[known]
+    return np.asarray(seeds[nearest], dtype=np.int32)
+
+
 def outlines(grid: Grid, tolerance: float) -> list[Points]:
     """Return the outlines of what is occupied, each a closed line (n, 2), metres.
 

@@ -14,14 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from floor_plans.floor_plan import FloorPlan
-from floor_plans.occupancy_grid import UNKNOWN, distance_to, regions
+from floor_plans.occupancy_grid import LARGE_PART, UNKNOWN, distance_to, divided, regions
 from floor_plans.rooms import PlaceError
 from floor_plans.shapes import WALL_THICKNESS, Point
 
 ROBOT_RADIUS = 0.22
 """Radius of a robot that has to get through the doors, metres, where nobody says another one."""
-_LARGE = 1.0
-"""A part of the floor from this size on that no point lies in is no part of a room, m^2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +103,7 @@ class RoomMap:
             free.astype(np.uint8), connectivity=4
         )
         areas = stats[:, cv2.CC_STAT_AREA] * self.grid.resolution**2
-        large = [each for each in range(1, count) if areas[each] >= _LARGE]
+        large = [each for each in range(1, count) if areas[each] >= LARGE_PART]
         if not large:
             return ()
         ways = self._ways_out(np.asarray(pieces, np.int32))
@@ -165,54 +163,18 @@ class RoomMap:
         return names
 
     def _divided(self) -> npt.NDArray[np.int32]:
-        """Return each cell's room by its number in `_names`, 0 in none, on a map or an open floor.
-
-        The lines of doors cut what is free into parts; a part is the room whose point lies in it,
-        and where several do (no door is drawn between them) the nearest one's. What is not free,
-        and a small part with no point, as the floor below a table, belongs to the nearest room.
-        """
-        import cv2
-
+        """Return each cell's room by its number in `_names`, 0 in none, on a map or open floor."""
         grid, positions = self.grid, self._plan.place.positions
-        free = grid.free
-        parts, stats = cv2.connectedComponentsWithStats(
-            free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
-        )[1:3]
-        inside: dict[int, list[int]] = {}
-        for number, room in self._names.items():
-            x, y, _ = positions[room]
-            if not grid.at(free, x, y):
+        points = [(x, y) for x, y, _ in (positions[room] for room in self._names.values())]
+        for room, (x, y) in zip(self._names.values(), points, strict=True):
+            if not grid.at(grid.free, x, y):
                 unknown = grid.at(grid.cells, x, y) in (None, UNKNOWN)
                 found = 'outside of what the map knows' if unknown else 'in a wall or a door'
                 raise PlaceError(
                     ('room_positions', room),
                     f'({x:g}, {y:g}) lies {found}: expected free space',
                 )
-            inside.setdefault(grid.at(parts, x, y), []).append(number)
-        number_of_part = np.full(len(stats), -1, np.int32)
-        for part, numbers in inside.items():
-            number_of_part[part] = numbers[0]
-        large = stats[:, cv2.CC_STAT_AREA] * grid.resolution**2 >= _LARGE
-        number_of_part[large & (number_of_part < 0)] = 0
-        number_of_part[0] = -1
-        labels: npt.NDArray[np.int32] = number_of_part[parts]
-        for part, numbers in inside.items():
-            if len(numbers) > 1:
-                cells = np.argwhere(parts == part)
-                centres = grid.centres_of(cells)
-                points = np.array([positions[self._names[number]][:2] for number in numbers])
-                away = np.stack([np.hypot(*(centres - point).T) for point in points])
-                labels[cells[:, 0], cells[:, 1]] = np.array(numbers)[np.argmin(away, axis=0)]
-        nearest = cv2.distanceTransformWithLabels(
-            (labels < 0).astype(np.uint8),
-            cv2.DIST_L2,
-            cv2.DIST_MASK_5,
-            labelType=cv2.DIST_LABEL_PIXEL,
-        )[1]
-        seeds = np.zeros(int(nearest.max()) + 1, np.int32)
-        known = labels >= 0
-        seeds[nearest[known]] = labels[known]
-        return np.asarray(seeds[nearest], dtype=np.int32)
+        return np.maximum(divided(grid, points), 0)
 
     def _check_doors(self) -> None:
         # Beside the door of a map there may stand something, and its cells may be large.

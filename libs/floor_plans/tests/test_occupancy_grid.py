@@ -10,6 +10,7 @@ import pytest
 from floor_plans import Grid
 from floor_plans.occupancy_grid import (
     distance_to,
+    divided,
     drawn_lines,
     empty_around,
     outlines,
@@ -97,3 +98,18 @@ def test_an_outline_runs_round_what_stands_there() -> None:
     assert (outline[0] == outline[-1]).all()
     (west, south), (east, north) = outline.min(axis=0), outline.max(axis=0)
     assert (west, south, east, north) == pytest.approx((2.0, 3.0, 3.0, 4.0), abs=0.1)
+
+
+def test_a_map_is_divided_into_the_rooms_of_its_points() -> None:
+    some = grid()  # 6 m x 4 m from (-1, 2)
+    some.cells[:, 20] = some.cells[:, 40] = 100  # walls at x = 1 and x = 3
+    some.cells[0:8, 50] = some.cells[8, 50:60] = 100  # 0.7 m2 in the corner: below a table
+    labels = divided(some, [(0.0, 3.0), (0.0, 5.5), (4.0, 5.0), (99.0, 0.0)])
+    assert some.at(labels, 0.5, 2.5) == 1
+    assert some.at(labels, 0.5, 5.0) == 2, 'the nearer point of one part'
+    assert some.at(labels, 4.8, 2.3) == 3, 'a small part belongs to the room beside it'
+    assert some.at(labels, 2.0, 4.0) < 0, 'a large part without a point is no room'
+    assert some.at(labels, 1.02, 3.0) in (1, some.at(labels, 2.0, 4.0)), 'walls are shared out'
+    assert set(np.unique(labels)) == {1, 2, 3, some.at(labels, 2.0, 4.0)}
+    solid = Grid(np.full((5, 5), 100, np.int8), 0.1)
+    assert (divided(solid, [(0.2, 0.2)]) == 0).all()

@@ -1,6 +1,7 @@
 """Which place a point of the map belongs to.
 
-The map is divided along its doors: what is connected without going through a door is one region,
+The map is divided along its doors (`floor_plans.occupancy_grid.divided`, as rooms of a floor plan
+are): what is connected without going through a door is one region,
 and a region belongs to the place whose point lies in it. Where a map shows several places in one
 region (no door drawn between them), the place with the nearest point is taken.
 """
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from floor_plans import Grid
-from floor_plans.occupancy_grid import drawn_lines, regions
+from floor_plans.occupancy_grid import divided, with_walls
 from floor_plans.shapes import Segment
 from lidar_navigation.geometry import Points
 
@@ -44,16 +45,14 @@ class PlaceRegions:
         }
         # A little longer than the opening, so that no gap remains beside the frame.
         lines = [_stretched(door, 2 * grid.resolution) for door in doors]
-        passable = grid.free & ~drawn_lines(grid, lines)
-        self._regions = regions(passable)
-        self._places: dict[int, list[str]] = {}
-        for name, point in self._points.items():
-            region = self._region(*point)
-            if region is not None:
-                self._places.setdefault(region, []).append(name)
+        names = list(self._points)
+        self._names = dict(enumerate(names, start=1))
+        self._rooms = divided(
+            with_walls(grid, lines), [(float(x), float(y)) for x, y in self._points.values()]
+        )
         self._beside: dict[int, set[int]] = {}
         for door in doors:
-            first, second = (self._region(*point) for point in _sides(door))
+            first, second = (self._room(*point) for point in _sides(door))
             if first is not None and second is not None and first != second:
                 self._beside.setdefault(first, set()).add(second)
                 self._beside.setdefault(second, set()).add(first)
@@ -65,12 +64,12 @@ class PlaceRegions:
         that one comes into through its doors.
         """
         xy = float(point[0]), float(point[1])
-        region = self._region(*xy)
-        if region is None:
+        room = self._room(*xy)
+        if room is None:
             return None
-        seen, front = {region}, {region}
+        seen, front = {room}, {room}
         while front:
-            names = [name for each in front for name in self._places.get(each, ())]
+            names = [self._names[each] for each in front if each in self._names]
             if names:
                 return min(names, key=lambda name: math.dist(self._points[name], xy))
             front = {other for each in front for other in self._beside.get(each, ())} - seen
@@ -79,23 +78,13 @@ class PlaceRegions:
 
     def cells_of(self, place: str) -> NDArray[np.bool_] | None:
         """Return the free cells of a place, shape as the map's; None where it has none."""
-        region = self._region(*self._points[place]) if place in self._points else None
-        if region is None:
-            return None
-        cells = np.asarray((self._regions == region) & self._grid.free)
-        others = [name for name in self._places[region] if name != place]
-        if others:
-            rows, columns = np.nonzero(cells)
-            spots = self._grid.centres_of(np.stack([rows, columns], axis=1))
-            own = np.linalg.norm(spots - self._points[place], axis=1)
-            for name in others:
-                nearer = np.linalg.norm(spots - self._points[name], axis=1) < own
-                cells[rows[nearer], columns[nearer]] = False
-        return cells
+        number = next((each for each, name in self._names.items() if name == place), None)
+        cells = np.asarray((self._rooms == number) & self._grid.free)
+        return cells if number is not None and cells.any() else None
 
-    def _region(self, x: float, y: float) -> int | None:
-        region: int | None = self._grid.at(self._regions, x, y)
-        return region
+    def _room(self, x: float, y: float) -> int | None:
+        room: int | None = self._grid.at(self._rooms, x, y)
+        return room
 
 
 class PlaceLocator:
