@@ -6,9 +6,12 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from floor_plans import read_place
+from floor_plans.imports import ImportRequest, import_place
+from floor_plans.occupancy_map import write_map
 from surveillance_operator.page.server import Page
 from surveillance_operator.place_page.edit_command import editor_page, main
 from tests.operator.browser import PHONE, Viewer
@@ -86,6 +89,35 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
     assert set(found.place.rooms) == {'kitchen', 'R2', 'R3', 'R4', 'E', 'C1', 'C2'}
     assert '# A point inside each place' in file.read_text()
     assert browser.axe() == []
+
+
+@in_browser
+def test_what_is_left_out_becomes_a_room_at_one_tap(browser: Viewer, tmp_path: Path) -> None:
+    cells = np.zeros((120, 200), np.int8)  # free up to the edge: the paper of a floor plan
+    cells[[20, 99], 20:180] = cells[20:100, 20] = cells[20:100, 179] = 100
+    cells[20:100, 100] = 100
+    cells[50:70, 100] = cells[50:70, 20] = 0
+    write_map(tmp_path / 'map.yaml', cells, 0.05, (0.0, 0.0, 0.0))
+    import_place(ImportRequest(tmp_path / 'map.yaml', tmp_path / 'place.yaml'))
+    page = editor_page(tmp_path / 'place.yaml', '127.0.0.1', 0, 0.22)
+    page.start()
+    try:
+        hand = Hand(browser, page)
+        assert hand.place('left_out')['1']['reason'] == 'outside of the building'
+        hand.click(*hand.place('left_out')['1']['at'])
+        hand.said('R3 is a room, joined by ')
+        assert hand.place('left_out') == {}
+        browser.click('#undo')
+        hand.said('undone: R3 is a room')
+        browser.js(
+            'const list = document.querySelector("#list"); list.value = "left_out 1";'
+            'list.dispatchEvent(new Event("change"))'
+        )
+        browser.until(lambda: browser.text('#chosen-h') == 'left out 1', 20.0)
+        assert 'outside of the building' in browser.text('[data-field=take]')
+        assert browser.axe() == []
+    finally:
+        page.stop()
 
 
 @in_browser

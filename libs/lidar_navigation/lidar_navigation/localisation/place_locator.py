@@ -1,9 +1,9 @@
 """Which place a point of the map belongs to.
 
-The map is divided along its doors (`floor_plans.occupancy_grid.divided`, as rooms of a floor plan
-are): what is connected without going through a door is one region,
-and a region belongs to the place whose point lies in it. Where a map shows several places in one
-region (no door drawn between them), the place with the nearest point is taken.
+The map is divided along its doors as a floor plan is (`floor_plans.occupancy_grid.divided`): what is
+connected without going through a door is one room, that of the place whose point lies in it. Where
+a map shows several places in one (no door drawn between them), the one with the nearest point is
+taken.
 """
 
 from __future__ import annotations

@@ -279,14 +279,14 @@ function panel() {
   $('save').disabled = !may || !place.changed;
   if (shows === panelShows) return;
   panelShows = shows;
-  $('chosen-h').textContent = chosen ? `${chosen.kind} ${chosen.name}` : 'Nothing chosen';
+  $('chosen-h').textContent = chosen ? `${chosen.kind.replace('_', ' ')} ${chosen.name}` : 'Nothing chosen';
   const form = h('form', {class: 'fields', 'aria-label': 'What is chosen', onsubmit: (event) => { event.preventDefault(); document.activeElement.dispatchEvent(new Event('change')); }});
   if (chosen) form.append(...FIELDS[chosen.kind](chosen.name).map((each) => field(each, chosen.kind)));
   else form.append(h('p', {class: 'note'}, 'Choose something on the floor or in the list.'));
   $('chosen').replaceChildren(form);
   $('whole-place').replaceChildren(h('h3', {}, 'The whole place'), ...WHOLE().map((each) => field(each)));
   const listed = [['room', place.rooms], ['door', place.doors], ['zone', place.zones], ['station', place.stations], ['marker', place.markers], ['left_out', place.left_out]];
-  $('list').replaceChildren(h('option', {value: ''}, '–'), ...listed.flatMap(([kind, entries]) => names(entries).map((name) => h('option', {value: `${kind} ${name}`}, `${kind} ${name}`))));
+  $('list').replaceChildren(h('option', {value: ''}, '–'), ...listed.flatMap(([kind, entries]) => names(entries).map((name) => h('option', {value: `${kind} ${name}`}, `${kind.replace('_', ' ')} ${name}`))));
   $('list').value = chosen ? `${chosen.kind} ${chosen.name}` : '';
 }
 
