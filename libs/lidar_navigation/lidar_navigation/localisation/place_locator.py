@@ -1,9 +1,8 @@
 """Which place a point of the map belongs to.
 
-The map is divided along its doors as a floor plan is (`floor_plans.occupancy_grid.divided`): what is
-connected without going through a door is one room, that of the place whose point lies in it. Where
-a map shows several places in one (no door drawn between them), the one with the nearest point is
-taken.
+The map is divided along its doors as a floor plan is (`floor_plans.occupancy_grid.divided`): what
+is connected without going through a door is one room, that of the place whose point lies in it.
+Where a map shows several places in one (no door drawn between them), the nearest one is taken.
 """
 
 from __future__ import annotations
