@@ -48,7 +48,7 @@ from owl_reasoner.owl.axioms import (
 )
 from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.vocabulary import NOTHING, THING
-from owl_reasoner.reasoner.hypertableau.entailment import UnsupportedError
+from owl_reasoner.reasoner.clauses import UnsupportedError
 
 BASE = 'http://example.org/'
 ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.nt')

@@ -18,6 +18,7 @@ from typing import Any
 from armor_service.access import Settings
 from armor_service.changes import Change
 from armor_service.directives import Directive, Kind, look_up
+from armor_service.doubtful_rules import doubtful_rules
 from armor_service.names import doubtful_names, unknown_names
 from armor_service.protocol import (
     DirectiveError,
@@ -217,7 +218,7 @@ class ArmorService:
         Raises:
             DirectiveError: 205, the service is strict about them.
         """
-        doubts = list(doubtful_names(ref, changes))
+        doubts = [*doubtful_names(ref, changes), *doubtful_rules(ref, changes)]
         if self._settings.strict:
             refused = [*unknown_names(ref, changes), *(d for d in doubts if 'forbids' in d)]
             if refused:

@@ -188,3 +188,24 @@ def test_what_armor_does_not_know_is_said_to_be_an_addition() -> None:
     written = [d for d in TABLE.values() if d.run.__module__.endswith('.manchester')]
     assert {'REMOVE RULE', 'QUERY AXIOMS'} <= {directive.words for directive in written}
     assert not [directive.words for directive in written if directive.native]
+
+
+def test_a_rule_that_counts_without_an_end_is_told_when_it_is_added(rooms: Ask) -> None:
+    for prop in 'nabcdef':
+        assert rooms('ADD AXIOM', f'DataProperty: {prop}').success
+    endless = 'N(?i), n(?i, ?v), swrlb:add(?w, ?v, 1) -> n(?i, ?w)'
+    said = rooms('ADD RULE', endless)
+    assert said.success
+    assert 'computes new values without an end: from n to n' in said.error_description
+    assert 'n(?i, ?v)' in said.error_description
+    assert 'without an end' not in rooms('ADD IND CLASS', 'x', 'DOOR').error_description
+    # Over two rules; and none where the value is compared, or not its own.
+    assert rooms('ADD RULE', 'a(?i, ?v) -> b(?i, ?v)').error_description == ''
+    said = rooms('ADD RULE', 'b(?i, ?v), swrlb:multiply(?w, ?v, 2) -> a(?i, ?w)')
+    assert 'from b to a to b' in said.error_description
+    for fine in (
+        'c(?i, ?v), swrlb:lessThan(?v, 9), swrlb:add(?w, ?v, 1) -> c(?i, ?w)',
+        'd(?i, ?v), swrlb:add(?w, ?v, 1) -> e(?i, ?w)',
+        'f(?i, ?v) -> f(?i, ?v)',
+    ):
+        assert 'without an end' not in rooms('ADD RULE', fine).error_description

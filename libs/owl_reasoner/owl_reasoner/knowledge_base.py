@@ -376,8 +376,8 @@ class KnowledgeBase:
             depend on.
 
         Raises:
-            UnsupportedError: The axiom is a key, a rule, a datatype definition or about anonymous
-                individuals, or compares data properties.
+            UnsupportedError: The axiom is a key, a rule, a datatype definition, or compares data
+                properties.
         """
         self._budget.begin(timeout, cancel)
         try:

@@ -15,7 +15,8 @@ from owl_reasoner.owl.axioms import Axiom, ClassAssertion, SubClassOf
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import NOTHING, SWRLB, THING, TOP_LITERAL, XSD
 from owl_reasoner.reasoner.budget import Budget
-from owl_reasoner.reasoner.hypertableau.entailment import CaseReasoner, UnsupportedError, entails
+from owl_reasoner.reasoner.clauses import UnsupportedError
+from owl_reasoner.reasoner.hypertableau.entailment import CaseReasoner, entails
 
 from .wide_ontologies import INDIVIDUALS, PlainOntology, WideOntology
 

@@ -16,7 +16,6 @@ from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import RDF, RDFS, XSD
-from strict_files.suggestions import nearest
 
 COMMENT = RDFS + 'comment'
 OWL_XML = (
@@ -246,12 +245,3 @@ def test_only_a_durable_file_waits_for_the_disk(
     names = [name.removeprefix(str(tmp_path)) for name in synced]
     assert [name.endswith('.draft') for name in names] == ([True, False] if durable else [])
     assert names[1:] == ([''] if durable else [])
-
-
-def test_the_nearest_name_or_all_of_them() -> None:
-    assert nearest('Rom', ['Door', 'room', 'ROOM']) == "'ROOM'"
-    assert nearest('x', ['long name']) == "'long name'"
-    assert nearest('x', ['bb', 'aa', 'bb']) == 'one of bb, aa'
-    many = [f'name{number}' for number in range(18)]
-    assert nearest('?', many[:16]) == f'one of {", ".join(many[:16])}'
-    assert nearest('?', many) == f'one of {", ".join(many[:16])} and 2 more'

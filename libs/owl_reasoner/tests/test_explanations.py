@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from owl_reasoner import KnowledgeBase
+from owl_reasoner import KnowledgeBase, Unknown
 from owl_reasoner.owl.axioms import (
     Axiom,
     ClassAssertion,
@@ -346,3 +346,12 @@ def test_a_value_is_told_as_it_is_asserted_of_the_same_individual() -> None:
                 f'  {individual} x:s {text}  [asserted]',
             ]
             assert explanation.sources()[1:] == (has(S, individual, literal),)
+
+
+def test_of_somebody_without_a_name_it_is_unknown_what_follows() -> None:
+    kb = KnowledgeBase(n('o'), [ClassAssertion(n('A'), '_:x')])
+    kb.reason()
+    assert kb.entails(ClassAssertion(n('A'), '_:x')) is True, 'it is asserted'
+    answer = kb.entails(ClassAssertion(n('B'), '_:x'))
+    assert isinstance(answer, Unknown)
+    assert 'somebody without a name' in str(answer)

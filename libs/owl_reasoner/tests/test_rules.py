@@ -120,7 +120,7 @@ TRUE, FALSE = Literal('true', XSD + 'boolean'), Literal('false', XSD + 'boolean'
         (Literal('a=b'), [computed('substringAfter', W, V, '=')], Literal('b')),
         (Literal('aab'), [computed('replace', W, V, 'a', 'x')], Literal('xxb')),
         (Literal('abab'), [computed('replace', W, V, '(a)b', '$1x')], Literal('axax')),
-        (Literal('abab'), [computed('replace', W, V, '(a)b', '$3')], None),
+        (Literal('abab'), [computed('replace', W, V, '(a)b', '$3')], Literal('')),
         (Literal('a,b'), [computed('tokenize', W, V, ','), computed('startsWith', W, 'b')], Literal('b')),
         (7, [computed('equal', W, V), computed('greaterThan', V, 6)], num(7)),
         (7, [computed('equal', W, V), computed('greaterThan', V, 7)], None),

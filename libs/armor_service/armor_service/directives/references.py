@@ -9,6 +9,7 @@ from pathlib import Path
 
 from armor_service.access import LOG_ENDINGS, ONTOLOGY_ENDINGS, WORLD_ENDINGS, Settings
 from armor_service.directives.table import control, flag, text, utility
+from armor_service.doubtful_rules import endless_rules
 from armor_service.protocol import (
     DirectiveError,
     DirectiveRequest,
@@ -29,7 +30,7 @@ from owl_reasoner import gc_control
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.knowledge_base import KnowledgeBase
-from owl_reasoner.owl.axioms import Axiom
+from owl_reasoner.owl.axioms import Axiom, Rule
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
 
 _BY_ENDING = {'.nt': 'ntriples', '.omn': 'manchester'}
@@ -430,6 +431,8 @@ def _read_document(
     took = (time.thread_time() - begin) / FIRST
     if not kb.consistent:
         notes.append('the ontology is inconsistent')
+    rules = [axiom for axiom in document.axioms if isinstance(axiom, Rule)]
+    notes += endless_rules(rules, rules)
     unsupported = [*document.unsupported, *kb.unsupported]
     if unsupported:
         more = f' and {len(unsupported) - MAX_NAMED} more' if len(unsupported) > MAX_NAMED else ''

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from typing import Any
 from urllib.parse import urljoin, urlsplit
@@ -97,6 +97,10 @@ def _arithmetic(compute: Callable[..., _Number]) -> _Solve:
 
 def _divide(first: _Number, second: _Number) -> _Number:
     if isinstance(first, float) or isinstance(second, float):
+        if second == 0.0:
+            # As IEEE 754 has it; Python raises.
+            sign = math.copysign(1.0, first) * math.copysign(1.0, second)
+            return math.nan if first == 0.0 or math.isnan(first) else sign * math.inf
         return first / second
     return _decimal(Fraction(first) / Fraction(second))
 
@@ -112,16 +116,32 @@ def _decimal(number: Fraction) -> Fraction:
 
 def _modulo(first: _Number, second: _Number) -> _Number:
     if isinstance(first, float) or isinstance(second, float):
-        return math.fmod(first, second)
+        try:
+            return math.fmod(first, second)
+        except ValueError:
+            return math.nan  # By zero, or of an infinite number.
     return first - second * math.trunc(Fraction(first) / Fraction(second))
 
 
 def _power(base: _Number, exponent: _Number) -> _Number:
     if isinstance(base, float) or isinstance(exponent, float):
-        return math.pow(base, exponent)
+        return _floating_power(float(base), float(exponent))
     if not isinstance(exponent, int) or abs(exponent) > 1024:
         raise ValueError
     return _decimal(Fraction(base) ** exponent)
+
+
+def _floating_power(base: float, exponent: float) -> float:
+    """As IEEE 754 has it; Python raises for what is infinite or no number."""
+    is_odd = math.isfinite(exponent) and math.fmod(exponent, 2.0) in (1.0, -1.0)
+    try:
+        return math.pow(base, exponent)
+    except OverflowError:
+        return -math.inf if base < 0.0 and is_odd else math.inf
+    except ValueError:
+        if base == 0.0 and exponent < 0.0:
+            return math.copysign(math.inf, base) if is_odd else math.inf
+        return math.nan
 
 
 def _rounding(compute: Callable[[Fraction], int]) -> _Solve:
@@ -151,8 +171,13 @@ def _integer_divide(*arguments: Value) -> Iterable[Value]:
     promoted = _numbers(arguments)
     if promoted is None:
         return ()
+    first, second = promoted[1]
     try:
-        return (math.trunc(_divide(*promoted[1])),)
+        if isinstance(first, float) or isinstance(second, float):
+            if math.isinf(second) and math.isfinite(first):
+                return (0,)
+            return (math.trunc(Fraction(first) / Fraction(second)),)
+        return (math.trunc(_divide(first, second)),)
     except (ArithmeticError, ValueError):
         return ()
 
@@ -232,7 +257,62 @@ def _after(text: str, mark: str) -> str | None:
 def _replace(text: str, pattern: str, new: str) -> str | None:
     if not _text(text, pattern, new):
         return None
-    return str(_pattern(pattern).sub(re.sub(r'\$(\d)', r'\\g<\1>', new), text))
+    found = _pattern(pattern)
+    if found.search(''):
+        raise ValueError  # XPath functions, 5.6.4: an error where it matches no character.
+    made = _replacement(new, found.groups)
+    return ''.join(
+        part
+        for end, match in _with_ends(found, text)
+        for part in (text[end : match.start() if match else None], made(match) if match else '')
+    )
+
+
+def _with_ends(pattern: Any, text: str) -> Iterator[tuple[int, Any]]:
+    """Yield each match with the end of the one before, and None at last."""
+    end = 0
+    for match in pattern.finditer(text):
+        yield end, match
+        end = match.end()
+    yield end, None
+
+
+def _replacement(text: str, groups: int) -> Callable[[Any], str]:
+    """Read a replacement: ``$N`` stands for a group, a backslash goes before ``$`` and itself.
+
+    Raises:
+        ValueError: Another character behind either.
+    """
+    parts: list[str | int] = []
+    place = 0
+    while place < len(text):
+        each = text[place]
+        place += 1
+        if each == '\\':
+            if text[place : place + 1] not in ('\\', '$'):
+                raise ValueError
+            parts.append(text[place : place + 1])
+            place += 1
+        elif each == '$':
+            digits = re.match('[0-9]+', text[place:])
+            if digits is None:
+                raise ValueError
+            number = digits[0]
+            # As many digits as there are groups for; the rest is text.
+            while len(number) > 1 and int(number) > groups:
+                number = number[:-1]
+            parts.append(int(number))
+            place += len(number)
+        else:
+            parts.append(each)
+
+    def made(match: Any) -> str:
+        return ''.join(
+            part if isinstance(part, str) else (match.group(part) or '') if part <= groups else ''
+            for part in parts
+        )
+
+    return made
 
 
 def _tokens(text: Value, pattern: Value) -> Iterable[Value]:

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
+from owl_reasoner.owl.axiom_text import axiom_text
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.entities import names_anonymous
 from owl_reasoner.reasoner.answers import Unknown
 from owl_reasoner.reasoner.budget import Budget
-from owl_reasoner.reasoner.clauses import StoppedError, UnsupportedError
+from owl_reasoner.reasoner.clauses import StoppedError
 from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter
 from owl_reasoner.reasoner.hypertableau.class_comparison import ClassComparison
 from owl_reasoner.reasoner.hypertableau.denials import Denial, denials
@@ -194,14 +195,14 @@ def entails(
 
     Returns:
         Unknown where some axioms are not covered, or the search was given up, and no contradiction
-        was found.
+        was found; and of individuals without a name, who are somebody, but nobody knows who.
 
     Raises:
-        UnsupportedError: The goal is a key, a rule, a datatype definition or about anonymous
-            individuals, or compares data properties.
+        UnsupportedError: The goal is a key, a rule, a datatype definition, or compares data
+            properties.
     """
     if goal is not None and names_anonymous(goal):
-        raise UnsupportedError('an axiom about anonymous individuals')
+        return Unknown((f'{axiom_text(goal)}: whether somebody without a name is such',))
     axioms = list(axioms)
     against: list[Denial] = [()] if goal is None else list(denials(goal))
     because: dict[str, None] = {}
