@@ -265,7 +265,7 @@ class EventLog:
         self._next = self.path.with_name(self.path.name + '.next')
         self._descriptor = -1
         self._boot = _boot()
-        self._reserved_until = 0.0
+        self._can_reserve = True
         self._has_told_of_gap = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -276,7 +276,11 @@ class EventLog:
             with self._locked():
                 pass
         except OSError as error:
-            raise FileError(f'cannot write the mission record {path}: {error.strerror}') from None
+            # What passes, another process that holds the file or a full disk, is no reason to end:
+            # the entries wait.
+            if error.errno not in (errno.EAGAIN, errno.ENOSPC, errno.EDQUOT):
+                problem = f'cannot write the mission record {path}: {error.strerror}'
+                raise FileError(problem) from None
 
     def write(self, name: str, time: float | None = None, /, **fields: object) -> RecordEntry:
         """Append one entry, after those that the disk did not take before.
@@ -315,25 +319,30 @@ class EventLog:
         with self._lock:
             if self._boot:
                 entry, self._boot = replace(entry, boot=self._boot), ''
+            # A process that holds the file still is not waited for anew with each entry.
+            patience = 0.0 if self._waiting else LOCK_PATIENCE
             self._waiting += line_of(entry)
-            lines = self._waiting
-            if self._has_told_of_gap:
-                why = 'some of what waited is lost' if self._lost else 'what waited is written'
-                lines += line_of(self.entry('gap', phase='end', why=why, lost=bool(self._lost)))
-            try:
-                size = self._append(lines)
-            except OSError as error:
-                if len(self._waiting) > MOST_WAITING:
-                    self._waiting = self._waiting[-MOST_WAITING:].partition(b'\n')[2]
-                    self._lost = '; the oldest events that waited for it are lost'
-                raise FileError(
-                    f'cannot write the mission record {self.path}: {error.strerror}{self._lost}'
-                ) from None
-            self._waiting, self._lost, self._has_told_of_gap = b'', '', False
-            return size
+            return self._write_waiting(patience)
 
-    def _append(self, lines: bytes) -> int:
-        with self._locked() as descriptor:
+    def _write_waiting(self, patience: float) -> int:
+        lines = self._waiting
+        if self._has_told_of_gap:
+            why = 'some of what waited is lost' if self._lost else 'what waited is written'
+            lines += line_of(self.entry('gap', phase='end', why=why, lost=bool(self._lost)))
+        try:
+            size = self._append(lines, patience)
+        except OSError as error:
+            if len(self._waiting) > MOST_WAITING:
+                self._waiting = self._waiting[-MOST_WAITING:].partition(b'\n')[2]
+                self._lost = '; the oldest events that waited for it are lost'
+            raise FileError(
+                f'cannot write the mission record {self.path}: {error.strerror}{self._lost}'
+            ) from None
+        self._waiting, self._lost, self._has_told_of_gap = b'', '', False
+        return size
+
+    def _append(self, lines: bytes, patience: float) -> int:
+        with self._locked(patience) as descriptor:
             if not self._reserve(descriptor):
                 self._expect_room(descriptor, len(lines))
             written = os.write(descriptor, lines)
@@ -349,17 +358,16 @@ class EventLog:
 
         Where it is not, there is still what was taken before.
         """
-        size = os.fstat(descriptor).st_size
-        if size + RESERVE / 2 <= self._reserved_until:
+        # Looked at each time: the file is another one now, or somebody has cut it short.
+        status = os.fstat(descriptor)
+        if not self._can_reserve or 512 * status.st_blocks - status.st_size >= RESERVE / 2:
             return True
         try:
-            allocate(descriptor, size, RESERVE)
+            allocate(descriptor, status.st_size, RESERVE)
         except OSError as error:
             if error.errno in (errno.ENOSPC, errno.EDQUOT):
                 return False
-            self._reserved_until = math.inf  # no such thing on this file system
-            return True
-        self._reserved_until = size + RESERVE
+            self._can_reserve = False  # no such thing on this file system
         return True
 
     def _expect_room(self, descriptor: int, wanted: int) -> None:
@@ -381,13 +389,16 @@ class EventLog:
         raise OSError(errno.ENOSPC, full)
 
     @contextmanager
-    def _locked(self) -> Iterator[int]:
+    def _locked(self, patience: float = LOCK_PATIENCE) -> Iterator[int]:
         """Give the file, which nobody else changes meanwhile and which ends with a whole line.
+
+        Args:
+            patience: How long another process that holds it is waited for, seconds.
 
         Raises:
             OSError: It cannot be opened, or another process holds it for too long.
         """
-        until = time.monotonic() + LOCK_PATIENCE
+        until = time.monotonic() + patience
         while True:
             if self._descriptor < 0:
                 flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC
@@ -402,7 +413,7 @@ class EventLog:
                 continue
             if self._is_current(descriptor):
                 break
-            self.close()  # it was packed away meanwhile
+            self._close_file()  # it was packed away meanwhile
         try:
             _end_whole(descriptor)
             yield descriptor
@@ -436,7 +447,14 @@ class EventLog:
                 packed.unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Close the file; nothing is lost without it."""
+        """Close the file, with what still waits for it where it takes that now."""
+        with self._lock:
+            if self._waiting:
+                with contextlib.suppress(FileError):
+                    self._write_waiting(LOCK_PATIENCE)
+            self._close_file()
+
+    def _close_file(self) -> None:
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1

@@ -8,6 +8,8 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -111,7 +113,9 @@ def test_a_torn_line_is_cut_off_by_whoever_writes_next(path: Path) -> None:
     assert [each.text('node') for each in read(path)] == ['b', 'c']
 
 
-def test_what_another_process_holds_is_written_later(path: Path) -> None:
+@contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Hold a log in another process, as one does that was stopped while it wrote."""
     holder = (
         'import fcntl, os, sys\n'
         'descriptor = os.open(sys.argv[1], os.O_RDWR | os.O_CREAT)\n'
@@ -119,19 +123,34 @@ def test_what_another_process_holds_is_written_later(path: Path) -> None:
         'print("held", flush=True)\n'
         'sys.stdin.read()\n'
     )
+    with subprocess.Popen(
+        [sys.executable, '-c', holder, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == 'held\n'
+        yield
+
+
+def test_what_another_process_holds_is_written_later(path: Path) -> None:
     with EventLog(path) as log:
-        with subprocess.Popen(
-            [sys.executable, '-c', holder, str(path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        ) as process:
-            assert process.stdout is not None
-            assert process.stdout.readline() == 'held\n'
-            with pytest.raises(FileError, match='Resource temporarily unavailable'):
-                log.write('restart', node='a', why='x')
+        with held(path), pytest.raises(FileError, match='Resource temporarily unavailable'):
+            log.write('restart', node='a', why='x')
         log.write('restart', node='b', why='x')
     assert [each.text('node') for each in read(path)] == ['a', 'b']
+
+
+def test_a_log_that_another_process_holds_can_be_opened_and_gets_at_the_end_what_waited(
+    path: Path,
+) -> None:
+    with held(path):
+        log = EventLog(path)
+        with pytest.raises(FileError):
+            log.write('restart', node='a', why='x')
+    log.close()
+    assert [each.text('node') for each in read(path)] == ['a']
 
 
 @pytest.mark.parametrize('name', KINDS)
@@ -204,3 +223,25 @@ def test_nothing_is_missing_where_what_waited_was_written(
         record.write('visit', 20_000.0, place='E', distance=1.0)
     assert summarize(read(path)).visits == {'E': kept + 2}
     assert gaps(read(path)) == []
+
+
+@pytest.mark.parametrize('how', ['packed', 'cut short', 'torn'])
+def test_a_full_disk_has_room_also_after_the_file_has_changed(
+    path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    disk = FullDisk(monkeypatch)
+    with EventLog(path) as log, EventLog(path) as other:
+        for _ in range(2000):
+            log.write('restart', node='a', why='x' * 100)
+        if how == 'packed':
+            other.begin_segment(other.entry('snapshot', 1.0, account={}))
+        elif how == 'cut short':
+            os.truncate(path, 0)
+        else:
+            with open(path, 'ab') as file:
+                file.write(b'{"event": "rest')
+            other.write('restart', node='b', why='x')
+        log.write('restart', node='c', why='x')
+        disk.is_full = True
+        room = 512 * path.stat().st_blocks - path.stat().st_size
+        assert room >= event_log.RESERVE / 2
