@@ -14,7 +14,7 @@ from typing import Any
 
 from indoor_watch import Event, EventState, Observation
 from strict_files.files import FileError
-from surveillance_runtime.event_log import EventLog, RecordEntry, read_all
+from surveillance_runtime.event_log import EventLog, RecordEntry, read_intact
 from surveillance_runtime.incidents import Cause, Incidents, SeenThing, Severity
 
 KIND = 'event'
@@ -139,9 +139,8 @@ class FindingTeller:
         """
         by_number = {each['number']: each for each in kept['events']}
         if self._log is not None:
-            with contextlib.suppress(FileError):
-                past = findings_of(read_all(self._log.path))
-                by_number = {number: each.to_json() for number, each in past.items()} | by_number
+            past = findings_of(read_intact(self._log.path))
+            by_number = {number: each.to_json() for number, each in past.items()} | by_number
         return {**kept, 'events': list(by_number.values())}
 
     def take_up(self, kept: Mapping[str, Any], find: Callable[[int], Event | None]) -> None:

@@ -576,12 +576,34 @@ def read_all(path: str | Path, passed: Counter[str] | None = None) -> Iterator[R
         FileError: A file cannot be read, or a finished line is not an entry.
     """
     for packed in segments(Path(path)):
-        try:
-            content = gzip.decompress(packed.read_bytes())
-        except (OSError, EOFError, zlib.error) as error:
-            raise FileError(f'cannot read the mission record {packed}: {error}') from None
+        content = _unpacked(packed)
         yield from (e for e in entries_of(content, f'{packed}', passed) if e.name != 'snapshot')
     yield from (entry for entry in read(path, passed) if entry.name != 'snapshot')
+
+
+def read_intact(path: str | Path, packed: int | None = None) -> Iterator[RecordEntry]:
+    """Give what is left of a log: a damaged line or file costs none of the others.
+
+    For what is better known in part than not at all; a mission is not gone on with by that.
+
+    Args:
+        path: The file.
+        packed: How many of the files that were packed away are read, the newest; None: all.
+    """
+    last = Path(path)
+    older = segments(last)
+    for each in [*older[len(older) - packed if packed is not None else 0 :], last]:
+        with contextlib.suppress(FileError):
+            content = read_file(last, LARGEST) if each is last else _unpacked(each)
+            intact = entries_of(content, f'{each}', is_whole=False)
+            yield from (entry for entry in intact if entry.name != 'snapshot')
+
+
+def _unpacked(packed: Path) -> bytes:
+    try:
+        return gzip.decompress(packed.read_bytes())
+    except (OSError, EOFError, zlib.error) as error:
+        raise FileError(f'cannot read the mission record {packed}: {error}') from None
 
 
 def segments(path: Path) -> list[Path]:
@@ -590,9 +612,15 @@ def segments(path: Path) -> list[Path]:
 
 
 def entries_of(
-    content: bytes, where: str, passed: Counter[str] | None = None
+    content: bytes, where: str, passed: Counter[str] | None = None, *, is_whole: bool = True
 ) -> Iterator[RecordEntry]:
     """Give the entries of a file's content, see `read`.
+
+    Args:
+        content: Of the file.
+        where: How the file is called in errors.
+        passed: See `read`.
+        is_whole: Whether each finished line is to be an entry; else one that is none is left out.
 
     Raises:
         FileError: A finished line is not an entry.
@@ -601,7 +629,12 @@ def entries_of(
     for number, line in enumerate(content.split(b'\n')[:-1], start=1):
         if not line.strip():
             continue
-        entry = _entry_of(line, f'{where}:{number}', before, passed)
+        try:
+            entry = _entry_of(line, f'{where}:{number}', before, passed)
+        except FileError:
+            if is_whole:
+                raise
+            continue
         if entry is not None:
             before, boot = entry.time, entry.boot or boot
             yield replace(entry, boot=boot) if boot else entry
@@ -685,6 +718,13 @@ def gaps(entries: Iterable[RecordEntry]) -> list[MissingTime]:
 
 
 # --- clocks ---
+
+
+def age(entry: RecordEntry, clocks: Clocks = CLOCKS) -> float:
+    """Return how long ago an entry was written, seconds; 0 where that is not known."""
+    if entry.steady is not None and entry.boot == _boot():
+        return max(0.0, clocks.steady() - entry.steady)
+    return max(0.0, clocks.wall() - entry.at) if entry.at is not None else 0.0
 
 
 def clock_step(before: RecordEntry, after: RecordEntry) -> float:

@@ -75,6 +75,24 @@ class SeenThing:
     confidence: float = 0.0
     rule: str = ''
 
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> SeenThing:
+        """Return what `asdict` gave.
+
+        Raises:
+            ValueError, KeyError, TypeError, IndexError: It is something else.
+        """
+        place, number = values['position'], int(values['number'])
+        if not 0 <= number < 2**32:
+            raise ValueError(f'number {number}: expected one of 32 bits')
+        return cls(
+            number,
+            *(str(values[name]) for name in ('kind', 'seen', 'subject')),
+            None if place is None else (float(place[0]), float(place[1])),
+            float(values['confidence']),
+            str(values['rule']),
+        )
+
 
 @dataclass(frozen=True)
 class IncidentUpdate:
@@ -134,7 +152,7 @@ class IncidentUpdate:
         """Return what `to_json` gave.
 
         Raises:
-            ValueError, KeyError, TypeError: It is something else.
+            ValueError, KeyError, TypeError, IndexError: It is something else.
         """
         given = dict(values)
         kind, name = given['cause']
@@ -145,9 +163,7 @@ class IncidentUpdate:
         )
         given['evidence'] = tuple(str(each) for each in given.get('evidence', ()))
         if (seen := given.get('finding')) is not None:
-            place = seen['position']
-            at = None if place is None else (float(place[0]), float(place[1]))
-            given['finding'] = SeenThing(**{**seen, 'position': at})
+            given['finding'] = SeenThing.from_json(seen)
         return cls(**given)
 
     def to_line(self) -> str:
@@ -163,7 +179,7 @@ class IncidentUpdate:
         """
         try:
             return cls.from_json(json.loads(line))
-        except (KeyError, TypeError, AttributeError) as error:
+        except (LookupError, TypeError, AttributeError) as error:
             raise ValueError(f'expected an incident, got {line[:60]!r}') from error
 
 
@@ -189,7 +205,9 @@ class Incidents:
     ) -> None:
         self._tell = tell
         self._node, self._robot, self._now = node, robot, now
-        self._lock = threading.Lock()
+        # Held while it is told, too: an end that overtakes a change would never be over. Who is
+        # told may ask what goes on.
+        self._lock = threading.RLock()
         self._open: dict[Cause, IncidentUpdate] = {}
 
     def begin(
@@ -231,7 +249,7 @@ class Incidents:
                 if told == replace(known, phase=IncidentPhase.UPDATE):
                     return
             self._open[about] = told
-        self._tell(told)
+            self._tell(told)
 
     def acknowledge(self, cause: tuple[str, str], by: str) -> None:
         """Note who takes care of an incident; nothing happens when there is none.
@@ -242,8 +260,8 @@ class Incidents:
         """
         with self._lock:
             known = self._open.get(Cause(*cause))
-        if known is not None:
-            self.begin(cause, known.text, known.severity, acknowledged_by=by)
+            if known is not None:
+                self.begin(cause, known.text, known.severity, acknowledged_by=by)
 
     def end(self, cause: tuple[str, str], text: str = '') -> None:
         """End an incident; nothing happens when there is none.
@@ -254,8 +272,8 @@ class Incidents:
         """
         with self._lock:
             begun = self._open.pop(Cause(*cause), None)
-        if begun is not None:
-            self._tell(replace(begun, phase=IncidentPhase.END, text=text or begun.text))
+            if begun is not None:
+                self._tell(replace(begun, phase=IncidentPhase.END, text=text or begun.text))
 
     def end_all(self, kind: str, text: str = '') -> None:
         """End all incidents of one kind of cause."""
@@ -289,6 +307,8 @@ CONSEQUENCE = 'robot'
 a cause of another kind, nobody is called for them as well."""
 KEPT = 1000
 """How many incidents that are over are kept."""
+MOST_NUMBERS = 100
+"""How many numbers of an incident are kept that began again: more are not latched."""
 MOST_OPEN = 1000
 """How many go on at most: beyond these, of what a stranger may make up, none is taken."""
 
@@ -303,6 +323,7 @@ class Incident:
         ended: When it ended; None: it goes on.
         calls: How often somebody was called.
         is_lost: Whether it ended since its owner, started again, has not told of it any more.
+        also: Its owner's further numbers for it: it began again within moments.
     """
 
     told: IncidentUpdate
@@ -310,6 +331,7 @@ class Incident:
     ended: float | None = None
     calls: int = 0
     is_lost: bool = False
+    also: tuple[str, ...] = ()
 
 
 @dataclass
@@ -353,6 +375,7 @@ class IncidentBook:
         self._call = call
         self._note = note
         self._open: dict[tuple[str, Cause], _Open] = {}
+        self._over: dict[tuple[str, str], None] = {}
         self.past: list[Incident] = []
 
     def hear(self, told: IncidentUpdate, now: float) -> None:
@@ -362,10 +385,12 @@ class IncidentBook:
             told: What it tells.
             now: Steady time, seconds.
         """
+        if (told.owner, told.id) in self._over:
+            return
         key = told.owner, told.cause
         known = self._open.get(key)
         if told.over:
-            if known is not None and known.ends_at is None:
+            if known is not None and (known.ends_at is None or known.is_lost):
                 known.ends_at, known.ending = now + SETTLED, told.text
                 known.is_lost = False
             return
@@ -378,10 +403,13 @@ class IncidentBook:
         else:
             worse = Severity.ALARM in (told.severity, known.incident.told.severity)
             # One that has begun again within moments is the same for people.
+            also = known.incident.also
+            if told.id not in (known.incident.told.id, *also):
+                also = (*also[-MOST_NUMBERS:], told.id)
             told = replace(told, id=known.incident.told.id)
             if worse:
                 told = replace(told, severity=Severity.ALARM)
-            known.incident = replace(known.incident, told=told)
+            known.incident = replace(known.incident, told=told, also=also)
             known.ends_at, known.is_lost = None, False
         self.advance(now)
 
@@ -404,6 +432,20 @@ class IncidentBook:
         ending = 'it was not told again after a restart'
         ends_at = now + TOLD_AGAIN
         self._open[told.owner, told.cause] = _Open(incident, next_call, ends_at, ending, True)
+
+    def forget(self, owner: str, *numbers: str) -> None:
+        """Take that an incident is over: what is still heard of it is old.
+
+        The topic is latched: who begins to listen hears of the last hundred, also of those that
+        have been over for long.
+
+        Args:
+            owner: Whose.
+            numbers: The owner's for it.
+        """
+        self._over |= {(owner, number): None for number in numbers if number}
+        while len(self._over) > KEPT:
+            del self._over[next(iter(self._over))]
 
     def restarted(self, owner: str, now: float) -> None:
         """Take that a node was started again: what it told of ends, unless it tells of it again."""
@@ -456,6 +498,8 @@ class IncidentBook:
     def _finish(self, each: _Open, now: float) -> None:
         incident = replace(each.incident, ended=now, is_lost=each.is_lost)
         self._note(incident)
+        if not incident.is_lost:  # its owner may have been silent only
+            self.forget(incident.told.owner, incident.told.id, *incident.also)
         self.past = [*self.past[-KEPT:], incident]
         if incident.calls:
             text = incident.told.text

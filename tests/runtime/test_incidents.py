@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import pytest
@@ -192,3 +193,22 @@ def test_causes_without_end_are_bounded() -> None:
         told = alarm(Cause('robot', str(number)), severity=Severity.WARNING)
         incidents.hear(told, 0.0)
     assert len(incidents.open()) == MOST_OPEN
+
+
+def test_an_end_is_told_after_the_change_that_came_before_it() -> None:
+    told: list[IncidentPhase] = []
+    ending: list[threading.Thread] = []
+
+    def tell(update: IncidentUpdate) -> None:
+        if update.phase is IncidentPhase.UPDATE:
+            ending.append(threading.Thread(target=incidents.end, args=(D1,)))
+            ending[0].start()
+            ending[0].join(0.1)  # where it does not wait, it has ended by then
+            incidents.updates()
+        told.append(update.phase)
+
+    incidents = Incidents(tell)
+    incidents.begin(D1, 'D1 is closed')
+    incidents.begin(D1, 'D1 is locked')
+    ending[0].join()
+    assert told == [IncidentPhase.BEGIN, IncidentPhase.UPDATE, IncidentPhase.END]

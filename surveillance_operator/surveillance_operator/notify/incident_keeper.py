@@ -7,6 +7,7 @@ what goes on and who was called for it, and nobody is called twice or never told
 from __future__ import annotations
 
 import contextlib
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,10 +16,12 @@ from typing import Any
 
 from strict_files.files import FileError
 from surveillance_runtime.event_log import (
+    KINDS,
     Clocks,
     EventLog,
     RecordEntry,
-    read,
+    age,
+    read_intact,
     record_in,
     steady_now,
 )
@@ -32,6 +35,8 @@ from surveillance_runtime.incidents import (
     SeenThing,
     Severity,
 )
+
+_A_ROBOT = re.compile('[A-Za-z0-9_]{1,200}')
 
 
 class IncidentKeeper:
@@ -58,7 +63,7 @@ class IncidentKeeper:
     ) -> None:
         self._lost = lost
         self._call, self._folder, self._mission_time = call, folder, mission_time
-        self._steady, self._wall = steady, wall
+        self._steady, self._clocks = steady, Clocks(wall, steady)
         self._logs: dict[Path, EventLog] = {}
         self.book = IncidentBook(self._on_call, self._on_note)
         if folder is not None:
@@ -88,12 +93,13 @@ class IncidentKeeper:
         """Write an entry to the log of a robot, or to that of what robots share."""
         if self._folder is None:
             return
-        own = self._folder / robot
-        path = record_in(own if robot and own.is_dir() else self._folder)
+        # Anybody may tell of something in any name: it is no path.
+        own = self._folder / robot if _A_ROBOT.fullmatch(robot) else self._folder
+        path = record_in(own if own.is_dir() else self._folder)
         # A full disk: the entry waits, and people are told all the same.
         with contextlib.suppress(FileError):
             if path not in self._logs:
-                self._logs[path] = EventLog(path, Clocks(self._wall, self._steady))
+                self._logs[path] = EventLog(path, self._clocks)
             self._logs[path].write(kind, self._mission_time(), **fields)
 
     def _on_call(self, call: IncidentCall) -> None:
@@ -106,7 +112,10 @@ class IncidentKeeper:
             self._write_incident(incident, 'begin')
         else:
             lasted = round(incident.ended - incident.began, 1)
-            self._write_incident(incident, 'end', seconds=lasted)
+            more: dict[str, object] = {'is_lost': True} if incident.is_lost else {}
+            if incident.also:
+                more['also'] = list(incident.also)
+            self._write_incident(incident, 'end', seconds=lasted, **more)
             if incident.is_lost:
                 self._lost(replace(incident.told, phase=IncidentPhase.END))
 
@@ -128,17 +137,16 @@ class IncidentKeeper:
         }
         if told.finding is not None:
             fields['finding'] = vars(told.finding)
-        given = {key: value for key, value in fields.items() if value not in ('', [])}
-        self.write('incident', told.robot, **{**given, 'name': told.cause.name}, **more)
+        required = KINDS['incident'].fields
+        given = {k: value for k, value in fields.items() if value not in ('', []) or k in required}
+        self.write('incident', told.robot, **given, **more)
 
     def _restore(self, folder: Path) -> None:
         """Take up what an earlier keeper of the same run had."""
         for own in (folder, *(each for each in _below(folder) if record_in(each).is_file())):
-            entries: list[RecordEntry] = []
-            with contextlib.suppress(FileError):
-                entries = read(record_in(own))
             begun: dict[str, tuple[RecordEntry, list[RecordEntry]]] = {}
-            for entry in entries:
+            # A file may have been packed away while something went on.
+            for entry in read_intact(record_in(own), packed=1):
                 if entry.name != 'incident':
                     continue
                 number, phase = entry.text('id'), entry.text('phase')
@@ -146,22 +154,25 @@ class IncidentKeeper:
                     begun[number] = entry, []
                 elif phase == 'end':
                     begun.pop(number, None)
+                    self._take_end(entry)
                 elif number in begun:
                     begun[number][1].append(entry)
             for first, calls in begun.values():
                 self._take_up(first, calls)
 
+    def _take_end(self, entry: RecordEntry) -> None:
+        if not entry.fields.get('is_lost'):
+            robot, node = str(entry.fields.get('robot', '')), entry.text('node')
+            also = entry.names('also') if 'also' in entry.fields else ()
+            self.book.forget(f'{robot}/{node}' if robot else node, entry.text('id'), *also)
+
     def _take_up(self, first: RecordEntry, calls: list[RecordEntry]) -> None:
         now = self._steady()
         last = calls[-1] if calls else first
-        with contextlib.suppress(ValueError, TypeError, KeyError):  # a stranger's line
+        with contextlib.suppress(ValueError, TypeError, LookupError):  # a stranger's line
             told = _update_of(last.fields)
-            began, called = (now - self._age(each) for each in (first, last))
+            began, called = (now - age(each, self._clocks) for each in (first, last))
             self.book.restore(told, began, len(calls), called, now)
-
-    def _age(self, entry: RecordEntry) -> float:
-        """Return how long ago an entry was written, seconds."""
-        return max(0.0, self._wall() - entry.at) if entry.at is not None else 0.0
 
 
 def _below(folder: Path) -> list[Path]:
@@ -175,7 +186,7 @@ def _update_of(fields: Any) -> IncidentUpdate:
     """Return the incident of an entry.
 
     Raises:
-        ValueError, TypeError, KeyError: It is none.
+        ValueError, TypeError, LookupError: It is none.
     """
 
     def text(key: str) -> str:
@@ -194,5 +205,5 @@ def _update_of(fields: Any) -> IncidentUpdate:
         action=text('action'),
         acknowledged_by=text('acknowledged_by'),
         evidence=tuple(map(str, fields.get('evidence', ()))),
-        finding=None if seen is None else SeenThing(**seen),
+        finding=None if seen is None else SeenThing.from_json(seen),
     )
