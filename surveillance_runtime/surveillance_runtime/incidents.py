@@ -87,7 +87,9 @@ class SeenThing:
             raise ValueError(f'number {number}: expected one of 32 bits')
         return cls(
             number,
-            *(str(values[name]) for name in ('kind', 'seen', 'subject')),
+            str(values['kind']),
+            str(values['seen']),
+            str(values['subject']),
             None if place is None else (float(place[0]), float(place[1])),
             float(values['confidence']),
             str(values['rule']),

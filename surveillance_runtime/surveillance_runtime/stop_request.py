@@ -26,6 +26,8 @@ OWN = 'auto'
 LONGEST_TEXT = 200
 """Letters that are kept of a name or a reason: anybody may send one."""
 _LARGEST = 10_000
+_LATEST = 1e11
+"""A time from here on, in seconds of UNIX time, is none: the file is damaged."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,8 @@ def own_file(domain: int, namespace: str, environ: Mapping[str, str]) -> Path:
         environ: The environment: `XDG_STATE_HOME` names the state folder, else ~/.local/state.
     """
     state = environ.get('XDG_STATE_HOME') or os.path.expanduser('~/.local/state')
-    robot = re.sub(r'\W', '_', namespace.strip('/'))
+    # Two robots, a/b and a_b, have two files.
+    robot = re.sub(r'[^\w.]', '_', namespace.strip('/').replace('/', '.'))
     name = f'stop_{domain}_{robot}.json' if robot else f'stop_{domain}.json'
     return Path(state, 'surveillance', name)
 
@@ -94,8 +97,10 @@ class StopFile:
             found = read_json(self.path, _LARGEST)
             if found is None:
                 return None
-            owner, reason = str(found['owner']), str(found['reason'])
-            return StopRequest(_in_one_line(owner), _in_one_line(reason), float(found['since']))
+            owner, reason, since = (found[each] for each in ('owner', 'reason', 'since'))
+            if not 0.0 <= float(since) < _LATEST:
+                raise ValueError(f'since {since!r:.20}, expected a time')
+            return StopRequest(_in_one_line(str(owner)), _in_one_line(str(reason)), float(since))
         except (FileError, KeyError, TypeError, ValueError) as error:
             return StopRequest('', f'{self.path} cannot be read: {error}', time.time())
 
