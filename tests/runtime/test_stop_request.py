@@ -61,7 +61,7 @@ def test_a_damaged_byte_stops_the_robot_and_is_told_in_one_line(file: StopFile, 
 def test_a_time_that_is_none_stops_the_robot(file: StopFile, since: str) -> None:
     assert file.path is not None
     file.keep(WISH)
-    file.path.write_text('{"owner": "a", "reason": "b", "since": %s}' % since)
+    file.path.write_text(f'{{"owner": "a", "reason": "b", "since": {since}}}')
     found = file.read()
     assert found is not None
     assert 'cannot be read' in found.words()
