@@ -22,7 +22,8 @@ from lidar_navigation.geometry import Mount, Scan, composed
 from state_machines import Interrupt
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.motion.arrival import MotionFailedError
-from surveillance_controllers.motion.navigation_motion import POSE, UNSURE_FOR, NavigationMotion
+from surveillance_controllers.motion.navigation_motion import NavigationMotion
+from surveillance_controllers.motion.pose_reports import POSE, UNSURE_FOR
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.qos import SENSOR_QOS
@@ -42,6 +43,10 @@ class Steersman:
         self.ambiguous = False
         self.awaits = ()
         self.may_be_in: tuple[str, ...] = ()
+
+    @property
+    def is_sure(self) -> bool:
+        return not (self.lost or self.ambiguous)
 
     def see(self, scan: Scan, now: float, _lidar: str = '') -> Velocity:
         self.seen.append(scan)
@@ -206,9 +211,9 @@ def test_a_robot_that_stands_and_does_not_know_where_it_is_calls_somebody(
         motion._see(Scan(np.zeros(9), np.ones(9), 8.0), Time(sec=1))
 
     see()
-    assert motion._unsure_since is not None
+    assert motion._reports._unsure_since is not None
     assert not graph.node.incidents.open()
-    motion._unsure_since -= UNSURE_FOR
+    motion._reports._unsure_since -= UNSURE_FOR
     navigator.task = Spin()  # who drives may yet find out
     see()
     assert not graph.node.incidents.open()

@@ -135,6 +135,11 @@ class Navigator:
         return self._localiser is not None and self._localiser.ambiguous
 
     @property
+    def is_sure(self) -> bool:
+        """Whether the robot knows where it is: not lost, and nowhere else as likely."""
+        return not (self.lost or self.ambiguous)
+
+    @property
     def may_be_in(self) -> tuple[str, ...]:
         """The places in which the robot may be: that of its pose, and of those that look alike."""
         if self._localiser is None:

@@ -1,19 +1,17 @@
 """Where a robot is on a map, from its odometry and its lidar.
 
 Between scans the estimate moves with the odometry. Each scan then corrects it: the pose is sought
-at which the seen points lie on the edges of what the map has occupied, by Gauss-Newton on the
-signed distance to those edges (a likelihood field; Thrun, Burgard, Fox, "Probabilistic Robotics",
-6.4), with weights that let go of points the map cannot explain, and a pull towards the odometry
-where the scan says nothing, as along a corridor.
+at which the seen points lie on the edges of what the map has occupied, with weights that let go of
+points the map cannot explain, and a pull towards the odometry where the scan says nothing, as along
+a corridor.
 
-How well a pose explains a scan is measured by casting the rays into the map: the part of them that
-go as far as they should. How large that part usually is differs between places: all but one in
-ten rays of a drawn map, fewer in a furnished one. When it drops below what is usual here, the robot
-doubts (it may have been pushed, carried, or slipped; or there only are obstacles that the map does
-not have) and looks for a better pose: near where it was, then everywhere, over a lattice of poses,
-the best of which are refined by the same correction and compared by their rays. A pose nearby that
-looks the same way and is clearly better is taken at once: the robot was pushed, or slipped. Any
-other one is followed first: it becomes a rival.
+How well a pose explains a scan is measured by casting the rays into the map (`scan_fit`). How large
+the part that fits usually is differs between places: all but one in ten rays of a drawn map, fewer
+in a furnished one. When it drops below what is usual here, the robot doubts: it may have been
+pushed, carried, or slipped; or there only are obstacles that the map does not have. What is new
+refutes no pose, and a pose that nothing refutes is kept. A refuted one is looked for: near where it
+was, then everywhere (`pose_search`). A pose nearby that looks the same way and is clearly better is
+taken at once: the robot was pushed, or slipped. Any other one is followed first, as a rival.
 
 Rivals are other poses at which the robot may be. They move with the odometry and are corrected by
 the same scans, until they explain less, or one of them wins. Rooms look alike: so are poses that
