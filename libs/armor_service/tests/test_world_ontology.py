@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import sqlite3
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -255,4 +254,3 @@ def test_nothing_is_known_of_what_was_rolled_back(file: File) -> None:
     file.ontology.rolled_back()
     file.change(removed=[axiom])
     assert file.left() == []
-    assert isinstance(file.db, sqlite3.Connection)

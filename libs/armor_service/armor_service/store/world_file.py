@@ -31,7 +31,7 @@ from armor_service.store.lock_holder import lock_holder
 from armor_service.store.records import TO_JSON, decode, encode, told_as_json, told_of
 from armor_service.store.salvage import salvage
 from armor_service.store.spill import Spill
-from armor_service.store.world_ontology import Quad, Read, WorldNames, WorldOntology
+from armor_service.store.world_ontology import AxiomsRead, Quad, WorldNames, WorldOntology
 from owl_reasoner.notifier import Changes
 from owl_reasoner.owl.axioms import Axiom, DataPropertyAssertion
 from owl_reasoner.owl.entities import entities_of, renamed
@@ -107,6 +107,9 @@ def _triggers() -> Iterator[tuple[str, str]]:
 
 class WorldFile:
     """The file of one reference; whoever calls it holds the reference's lock, unless it says so.
+
+    Large because a transaction, the spill and what others wrote all work on one record of what the
+    file lacks, which only changes together.
 
     Args:
         path: The file.
@@ -748,7 +751,7 @@ class WorldFile:
             return None
         return self._merge(ontology, Told(FILE, time.time(), tuple(changes)), replacing)
 
-    def _replacing(self, found: Read) -> list[SetAssertion]:
+    def _replacing(self, found: AxiomsRead) -> list[SetAssertion]:
         """Take the numbers out of what was read that take the place of one of another type.
 
         owlready2 writes every whole number as xsd:integer and every other one as xsd:decimal, and
@@ -817,7 +820,7 @@ class WorldFile:
             f'it is kept in {aside.name}'
         )
 
-    def _forget_refused(self, found: Read) -> None:
+    def _forget_refused(self, found: AxiomsRead) -> None:
         """Take back what was read of it when the file was opened."""
         kb = self.ref.kb
         known = [axiom for axiom in found.added if axiom in kb and self._net.get(axiom) != 1]

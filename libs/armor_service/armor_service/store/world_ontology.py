@@ -126,7 +126,7 @@ class Places:
 
 
 @dataclass(slots=True)
-class Read:
+class AxiomsRead:
     """What was read.
 
     Attributes:
@@ -142,6 +142,8 @@ class Read:
 
 class WorldOntology:
     """One ontology of a World's file.
+
+    Large because writing, removing and reading an axiom share what is known of its quads.
 
     Whoever calls it holds the transaction; after one that failed `rolled_back` is called.
 
@@ -431,7 +433,7 @@ class WorldOntology:
 
     # --- reading ---
 
-    def read(self) -> Read:
+    def read(self) -> AxiomsRead:
         """Read all axioms."""
         execute, c = self._db.execute, self.context
         self._names.read_all()
@@ -441,7 +443,7 @@ class WorldOntology:
         self._kinds = self._declarations()
         self._places, self._undo = {}, []
         self._shared.clear()
-        found = Read()
+        found = AxiomsRead()
         rest: list[Quad] = []
         for quad in execute(f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} ORDER BY rowid'):
             axiom = self._fact(quad)
@@ -601,14 +603,14 @@ class WorldOntology:
 
     # --- what others changed ---
 
-    def read_changes(self, come: Iterable[Quad], gone: Iterable[Quad]) -> Read:
+    def read_changes(self, come: Iterable[Quad], gone: Iterable[Quad]) -> AxiomsRead:
         """Read what others changed; what is known of the quads follows.
 
         Args:
             come, gone: The quads.
         """
         come, gone = list(come), list(gone)
-        found = Read()
+        found = AxiomsRead()
         rest: list[tuple[Quad, bool]] = []
         changed = [(quad, True) for quad in come] + [(quad, False) for quad in gone]
         for quad, is_there in changed:
@@ -631,7 +633,7 @@ class WorldOntology:
             self._read_rest(rest, found)
         return found
 
-    def _read_rest(self, changed: list[tuple[Quad, bool]], found: Read) -> None:
+    def _read_rest(self, changed: list[tuple[Quad, bool]], found: AxiomsRead) -> None:
         nodes = {
             number
             for quad, _ in changed
