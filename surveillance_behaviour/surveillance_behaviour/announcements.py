@@ -61,7 +61,7 @@ class SettingsCheck:
             if name not in known:
                 self._warn(
                     f'rooms_priority: the ontology has no class {name!r} of places, expected '
-                    f'{nearest(name, known)}; this rule never applies'
+                    f'{nearest(name, known)}; the rule applies once a place is in such a class'
                 )
 
 

@@ -255,8 +255,6 @@ def test_a_text_that_no_mail_can_hold_goes_out_in_one_line(
     assert message.count(b'Subject:') == 1
 
 
-# --- the file ---
-
 
 @pytest.mark.parametrize('kind', SINKS)
 def test_each_kind_of_sink_is_in_the_documents(kind: str) -> None:
@@ -284,7 +282,7 @@ def test_a_file_names_the_sinks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ('entry', 'message'),
     [
-        ({'webhok': 'x'}, 'expected one of webhook, mqtt, email, command, got 0'),
+        ({'webhok': 'x'}, f'expected one of {", ".join(SINKS)}, got 0'),
         ({'webhook': 'ftp://x'}, "webhook: expected such as 'https://example.org'"),
         ({'webhook': 'https://u:hunter@x'}, 'webhook: a secret must not stand here'),
         ({'webhook': 'https://x', 'token': 'hunter'}, 'expected token_file or token_env'),
