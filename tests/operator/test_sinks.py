@@ -255,7 +255,6 @@ def test_a_text_that_no_mail_can_hold_goes_out_in_one_line(
     assert message.count(b'Subject:') == 1
 
 
-
 @pytest.mark.parametrize('kind', SINKS)
 def test_each_kind_of_sink_is_in_the_documents(kind: str) -> None:
     """A new kind is an entry of the table, and a row of the page that users read."""
