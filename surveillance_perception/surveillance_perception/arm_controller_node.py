@@ -40,6 +40,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.robot_arm import ARM, REST_PATIENCE, Arm, Array
+from surveillance_runtime.sensing.sensors import measured_at
 from surveillance_runtime.stamp_offset import StampOffset
 from surveillance_runtime.stamped_readings import OdometryStamps, StampedReadings
 from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
@@ -192,11 +193,7 @@ class ArmController(PatrolNode):
 
     def _measured(self, message: JointState | Odometry, stamps: StampOffset) -> float:
         """Return when a reading was made, seconds of this node's clock."""
-        stamp, now = seconds_of(message.header.stamp), self._now()
-        measured = stamps.time_of(stamp, now) if stamp else now
-        if (warning := stamps.warning()) is not None:
-            self.get_logger().warn(warning)
-        return measured
+        return measured_at(self, stamps, seconds_of(message.header.stamp), self._now())
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         try:

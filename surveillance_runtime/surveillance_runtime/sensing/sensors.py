@@ -19,6 +19,21 @@ from surveillance_runtime.state_topics import StateSubscription
 REPEATED = 'the same message comes again and again'
 
 
+def measured_at(node: PatrolNode, stamps: StampOffset, stamp: float, now: float) -> float:
+    """Return when a message was measured, seconds of a node's clock; warn once of odd stamps.
+
+    Args:
+        node: The node that reads.
+        stamps: Follows the stamps of that source.
+        stamp: The message's, seconds; 0: it has none.
+        now: When it came, seconds of the node's clock.
+    """
+    measured = stamps.time_of(stamp, now) if stamp else now
+    if (warning := stamps.warning()) is not None:
+        node.get_logger().warn(warning)
+    return measured
+
+
 class SensorStream:
     """The messages of one sensor's topic, in the executor's thread.
 
@@ -75,10 +90,7 @@ class SensorStream:
             return now
         if self._stamps is None or stamp < 0.0:
             return stamp
-        measured = self._stamps.time_of(stamp, now)
-        if (warning := self._stamps.warning()) is not None:
-            self._node.get_logger().warn(warning)
-        return measured
+        return measured_at(self._node, self._stamps, stamp, now)
 
     @property
     def stamp(self) -> float:
