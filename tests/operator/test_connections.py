@@ -164,3 +164,14 @@ def test_what_the_page_does_not_do_is_named(page: Page) -> None:
     assert "no action 'stopp', expected 'stop'" in text
     upgrade = {'Connection': 'Upgrade', 'Upgrade': 'websocket'}
     assert ask(page, 'GET', '/', **upgrade)[0] == 426
+
+
+def test_a_half_request_after_a_whole_one_ends_as_well(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, 'HEADER_TIME', 0.2)
+    whole = f'GET /static/none HTTP/1.1\r\nHost: 127.0.0.1:{page.port}\r\n\r\n'.encode()
+    with connect(page, whole) as peer:
+        assert peer.recv(65_536)
+        peer.sendall(b'GET / HTT')
+        assert ended(peer)

@@ -53,10 +53,15 @@ class BoundedConnection(H11Protocol):
     def data_received(self, data: bytes) -> None:
         """Take what came; a request that is whole may take its time to be answered."""
         super().data_received(data)
-        if self.is_whole:
-            self._end_in(None)
-        elif self.cycle is not None:
+        if self.cycle is None:
+            return
+        if self.cycle.more_body:
             self._end_in(BODY_SILENCE)
+        elif not self.cycle.response_complete:
+            self._end_in(None)
+        elif self._deadline is None:
+            # The last request is answered: this is half the head of another.
+            self._end_in(HEADER_TIME)
 
     @property
     def is_whole(self) -> bool:
