@@ -174,9 +174,14 @@ class Alarm(PatrolNode):
 
     def _hear(self, told: IncidentUpdate, publisher: bytes) -> None:
         teller = self._tellers.get(told.owner, publisher)
-        if told.over and teller != publisher and teller in self._there():
-            # Who can end another one's alarm can silence it.
-            text = f'another node says that {told.cause} of {told.owner} is over'
+        there = self._there() if publisher != teller else {}
+        name = there.get(publisher, '')
+        if name == self.get_fully_qualified_name():
+            return  # this node has told of what is lost
+        # A node that was started again is another publisher of the same name.
+        if teller in there and name.rpartition('/')[2] not in ('', told.node):
+            # Who can end another one's alarm, or take care of it, can silence it.
+            text = f'{clean(name)} tells of {told.cause} of {told.owner}'
             self.get_logger().error(f'{text}, which is not believed', throttle_duration_sec=10.0)
             return
         self._tellers[told.owner] = publisher

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pytest
 from rclpy.parameter import Parameter
 
 from surveillance_operator.alarm_node import Alarm
@@ -57,7 +58,10 @@ def test_a_changed_parameter_is_in_the_log(graph: Any, tmp_path: Path) -> None:
     graph.until(is_kept)
 
 
-def test_a_stranger_cannot_end_the_alarm_of_another_node(graph: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize('first', [IncidentPhase.UPDATE, IncidentPhase.END])
+def test_a_stranger_cannot_end_the_alarm_of_another_node(
+    graph: Any, tmp_path: Path, first: IncidentPhase
+) -> None:
     graph.add(Alarm, parameters={'folder': str(tmp_path)})
     robot = graph.add(partial(PatrolNode, 'robot_behavior'))
     stranger = graph.add(partial(PatrolNode, 'stranger'))
@@ -65,7 +69,9 @@ def test_a_stranger_cannot_end_the_alarm_of_another_node(graph: Any, tmp_path: P
     graph.until(lambda: ('D1', 'call') in phases(tmp_path))
     (told,) = robot.incidents.updates()
     said = graph.said()
-    IncidentPublisher(stranger).publish(replace(told, phase=IncidentPhase.END))
+    foreign = IncidentPublisher(stranger)
+    foreign.publish(replace(told, phase=first, acknowledged_by='a stranger'))
+    foreign.publish(replace(told, phase=IncidentPhase.END))
     graph.until(lambda: any('which is not believed' in line for line in said))
     robot.incidents.end(DOOR)
     graph.until(lambda: ('D1', 'end') in phases(tmp_path))
