@@ -45,15 +45,6 @@ class MarkerCheck:
     look_from: Spot | None
     is_open: bool = False
 
-    def to_json(self) -> dict[str, Any]:
-        """Return it as plain values, without the place."""
-        return {
-            'name': self.name,
-            'at': [round(each, 2) for each in self.at],
-            'from': None if self.look_from is None else [round(each, 2) for each in self.look_from],
-            'open': self.is_open,
-        }
-
 
 class MarkerChecks:
     """The checks of markers.

@@ -11,7 +11,7 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,18 +122,6 @@ class Coverage:
     area: float
     pictures: int
     camera_share: float = math.nan
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as plain values; a share that is not known is missing."""
-        values = {
-            'place': self.place,
-            'began': round(self.began, 3),
-            'ended': round(self.ended, 3),
-            'area': round(self.area, 2),
-            'pictures': self.pictures,
-        }
-        shares = {'share': self.share, 'camera_share': self.camera_share}
-        return values | {k: round(v, 3) for k, v in shares.items() if not math.isnan(v)}
 
 
 @dataclass(eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import zlib
 from dataclasses import replace
 
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from floor_plans import Grid
-from indoor_watch import MOST_CELLS, Coverage, Kind, Observation, same_map
+from indoor_watch import MOST_CELLS, Kind, Observation, same_map
 from indoor_watch.agreement import Agreement
 from indoor_watch.floor import FloorView
 from indoor_watch.floor_layers import check, packed, unpacked
@@ -50,16 +49,6 @@ def test_pictures_agree_three_in_a_row_or_two_of_one_stay_some_time_apart(
     agreement: Agreement[str] = Agreement()
     told = [agreement.take(*each) for each in pictures]
     assert told[-1] is settled
-
-
-def test_a_look_is_told_without_what_is_not_known() -> None:
-    look = Coverage('R1', 10.00049, 20.5, 0.12345, 3.456, 7, math.nan)
-    assert look.to_json() == {
-        'place': 'R1', 'began': 10.0, 'ended': 20.5, 'area': 3.46, 'pictures': 7, 'share': 0.123,
-    }  # fmt: skip
-    whole = replace(look, share=math.nan, camera_share=0.98765).to_json()
-    assert 'share' not in whole
-    assert whole['camera_share'] == 0.988
 
 
 def test_a_map_is_the_same_one_when_all_of_it_is() -> None:
