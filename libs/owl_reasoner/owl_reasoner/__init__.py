@@ -7,10 +7,13 @@
     kb.reason()
     kb.instances(iri + '#URGENT')
 
-Begin with `python -m owl_reasoner.demo`, then `knowledge_base`. Public is what this module lists,
-what `owl_reasoner.owl` has (axioms and expressions), and `owl_reasoner.owlready`; the rest may
-change. `documents` reads and writes, `reasoner` derives and explains. Nothing here needs Java. Each
-name is imported when it is first used.
+Begin with `python -m owl_reasoner.demo`, then `knowledge_base`. `documents` reads and writes,
+`reasoner` derives and explains, `owlready` does the same for owlready2's worlds. Nothing here needs
+Java. Each name is imported when it is first used.
+
+Public modules: `documents.manchester`, `documents.reading`, `documents.writing`, `knowledge_base`,
+`notifier`, `open_world`, `owl`, `owl.axiom_text`, `owl.axioms`, `owl.entities`, `owl.expressions`,
+`owl.vocabulary`, `owlready`.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ if TYPE_CHECKING:
     from owl_reasoner.reasoner.explanation import Explanation as Explanation
 
 _HOME = {
-    'Changes': 'feed',
+    'Changes': 'notifier',
     'Explanation': 'reasoner.explanation',
     'KnowledgeBase': 'knowledge_base',
     'OntologyDocument': 'documents.reading',

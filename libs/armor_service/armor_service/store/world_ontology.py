@@ -113,7 +113,7 @@ class WorldNames:
 
 
 @dataclass(slots=True)
-class Places:
+class AxiomQuads:
     """Where an axiom stands that is not plain.
 
     Attributes:
@@ -168,7 +168,7 @@ class WorldOntology:
         self._declared: set[tuple[str, str]] = set()
         self._labels: dict[str, int] = {}
         self._label_of: dict[int, str] = {}
-        self._places: dict[Axiom, Places] = {}
+        self._places: dict[Axiom, AxiomQuads] = {}
         self._shared: Counter[int | Quad] = Counter()
         self._undo: list[Callable[[], object]] = []
         self._new_labels: list[tuple[str, int]] = []
@@ -278,7 +278,7 @@ class WorldOntology:
                 # Somebody may have written the text where this would write a number.
                 self._delete((*quad[:2], axiom.literal.lexical, quad[3]))
 
-    def _clear(self, places: Places) -> None:
+    def _clear(self, places: AxiomQuads) -> None:
         for node in places.nodes:
             if self._is_last(node):
                 self._db.execute(f'DELETE FROM objs WHERE s=? AND c={self.context}', (node,))
@@ -346,7 +346,7 @@ class WorldOntology:
             taken = dict.fromkeys(self._places[axiom.axiom].nodes)
         own = {number: None for number in made.values() if number not in taken}
         rest = tuple(quad for quad in quads if quad[0] not in own)
-        self._stand(axiom, Places(tuple(own), rest))
+        self._stand(axiom, AxiomQuads(tuple(own), rest))
 
     def _annotating(
         self, axiom: ax.AxiomAnnotation, triples: list[Triple], made: dict[str, int]
@@ -366,7 +366,7 @@ class WorldOntology:
                         made[label] = number
         return [triple for triple in triples if triple not in stated]
 
-    def _stand(self, axiom: Axiom, places: Places) -> None:
+    def _stand(self, axiom: Axiom, places: AxiomQuads) -> None:
         before = self._places.get(axiom)
         self._places[axiom] = places
         if before is None:
@@ -560,7 +560,7 @@ class WorldOntology:
         sources: Iterable[str | Triple],
         numbers: Mapping[str, int],
         of_node: Mapping[int, list[Quad]],
-    ) -> Places:
+    ) -> AxiomQuads:
         """Return where an axiom stands that was read from nodes and statements."""
         nodes: dict[int, None] = {}
         quads: list[Quad] = []
@@ -577,14 +577,14 @@ class WorldOntology:
             # It stands on the node of its axiom.
             said = {(self._number(p), self._value(v)) for p, v in axiom.annotations}  # type: ignore[attr-defined]
             on = (quad for node in pending for quad in of_node.get(node, ()))
-            return Places((), tuple(quad for quad in on if (quad[1], quad[2:]) in said))
+            return AxiomQuads((), tuple(quad for quad in on if (quad[1], quad[2:]) in said))
         while pending:
             node = pending.pop()
             if node < 0 and node not in nodes and node not in self._label_of:
                 nodes[node] = None
                 if not is_annotation:
                     pending += [q[2] for q in of_node.get(node, ()) if len(q) == 3]
-        return Places(tuple(nodes), tuple(quad for quad in quads if quad[0] not in nodes))
+        return AxiomQuads(tuple(nodes), tuple(quad for quad in quads if quad[0] not in nodes))
 
     def _reifies(self, quads: Iterable[Quad]) -> bool:
         axiom = self._names.find(_AXIOM)
