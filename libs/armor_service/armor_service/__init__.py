@@ -7,12 +7,12 @@
 `ArmorClient` builds directives and reads answers over any transport. The node and the ROS transport
 stand outside: `surveillance_ontology.armor_server_node`, `surveillance_ontology.armor_client`.
 
-Begin with `python -m armor_service.demo`, then `service` and `directives.table`. From the bottom: `protocol`
-(requests, answers), `rendering` and `facts` (texts), `changes` (of an ontology), `quarantine`,
-`reference` and `registry` (loaded ontologies), `store` (what outlives the process), `names` and
-`doubtful_rules` (what was probably not meant), `access` (limits and files), `workspace` (all of
-these: what directives act on), `directives` (what each does), `service` (dispatch and locks) and
-`client`.
+Begin with `python -m armor_service.demo`, then `service` and `directives.table`. From the bottom:
+`protocol` (requests, answers), `rendering` and `facts` (texts), `changes` (of an ontology),
+`quarantine`, `reference` and `registry` (loaded ontologies), `store` (what outlives the process),
+`names` and `doubtful_rules` (what was probably not meant), `access` (limits and files), `workspace`
+(all of these: what directives act on), `directives` (what each does), `service` (dispatch and
+locks) and `client`.
 
 Public modules: `access`, `changes`, `client`, `facts`, `protocol`, `service`, `store.store`,
 `turns`.
