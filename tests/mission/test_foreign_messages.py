@@ -17,7 +17,7 @@ from .robot import mission
 
 NOT_OURS = ('/clock', '/parameter_events', '/rosout', '/diagnostics')
 """Simulated time is the whole domain's; a parameter event is what another node says of itself."""
-COMMANDS = ('container_init', 'map/build_map', '_action/')
+COMMANDS = ('container_init', 'map/build_map', '_action/', 'stop_requested')
 """What is sent there is obeyed: that is what the topic is for."""
 SECONDS = 110.0
 
