@@ -387,7 +387,11 @@ def test_charges_are_put_only_where_the_charge_would_not_last(
             used += rules.away[at][target]
             if target >= rules.count:
                 used = 0.0
-            elif energy.full - energy.draw * used < energy.least[target] - 1e-9:
+            # Straight from a charge nothing better can be done: there may be a place that is within
+            # reach only by way of another one.
+            elif at < rules.count and (
+                energy.full - energy.draw * used < energy.least[target] - 1e-9
+            ):
                 return True
             at = target
         return False
