@@ -90,9 +90,12 @@ def test_scan_rests_at_each_view_and_can_be_cancelled(graph: Any) -> None:
     goal = ScanSurroundings.Goal(lowest=-0.1, highest=0.1, dwell=0.01)
     end = scan.run(goal, accept_timeout=60.0, on_feedback=views.append)
     assert end.status == 'succeeded'
-    assert end.result.views == views[-1].views >= 3
+    assert end.result.views >= 3
     assert end.result.coverage == 1.0
-    assert [view.resting for view in views] == [False, True] * end.result.views
+    # Feedback may be lost before the two have met and just before the result, never out of order.
+    steps = [(view.view, view.resting) for view in views]
+    assert steps == sorted(set(steps))
+    assert {view.views for view in views} == {end.result.views}
     assert len([each for each in rests if each.data]) >= end.result.views
     interrupt = Interrupt()
     with pytest.raises(CallInterruptedError):

@@ -112,6 +112,22 @@ class Stubborn(ScriptedActionServer):
     cancel = CancelResponse.REJECT
 
 
+def feed(run, message, heard):
+    """Publish a feedback until its client has heard it.
+
+    Feedback is a topic: what is published before the two have met, or just before the result, may
+    never be heard, since rclpy's client listens no more once it has the result.
+
+    Args:
+        run: The goal's run.
+        message: The feedback.
+        heard: A predicate: the client has this feedback.
+    """
+    while not heard():
+        run.feedback(message)
+        run.sleep(0.01)
+
+
 def service(node, **arguments):
     return ServiceState(node, 'trigger', Trigger, **{'timeout': LONG, **arguments})
 
