@@ -193,8 +193,9 @@ class PythonEnvironment:
         self.checkout = checkout
         self.wheels = None if wheels is None else _sound_wheels(wheels)
         self._wanted_extras = tuple(extras)
-        complete_ones = (each for each in self._folders() if self._complete(each))
-        self.venv = next(complete_ones, checkout / _FIRST)
+        complete_ones = [each for each in self._folders() if self._complete(each)]
+        # With the most extras: the others go as soon as nobody runs in them.
+        self.venv = max(complete_ones, key=_number_of_extras, default=checkout / _FIRST)
 
     @property
     def python(self) -> Path:
@@ -242,15 +243,23 @@ class PythonEnvironment:
         paths = (self.checkout / name for name in chain([_FIRST], further))
         self.venv = next(path for path in paths if not os.path.lexists(path))
 
-    def _settle(self) -> None:
-        """Point `.venv` to this environment, and remove older ones of its interpreter that nobody
-        uses.
+    def _spare(self) -> list[Path]:
+        """Return the other environments of this interpreter that nobody needs: none runs in them,
+        and they have nothing that this one lacks.
         """
-        python = SetUpJournal.read(self.venv).python
+        own = SetUpJournal.read(self.venv)
+        spare = []
         for venv in self._folders():
-            stale = SetUpJournal.read(venv).python == python and not self._complete(venv)
-            if venv != self.venv and stale and not users_of(venv):
-                shutil.rmtree(venv, ignore_errors=True)
+            journal = SetUpJournal.read(venv)
+            less = not self._complete(venv) or set(journal.extras) <= set(own.extras)
+            if venv != self.venv and journal.python == own.python and less and not users_of(venv):
+                spare.append(venv)
+        return spare
+
+    def _settle(self) -> None:
+        """Remove the environments that nobody needs, and point `.venv` to this one."""
+        for venv in self._spare():
+            shutil.rmtree(venv, ignore_errors=True)
         first = self.checkout / _FIRST
         if self.venv != first and (first.is_symlink() or not first.exists()):
             draft = self.checkout / f'{_FIRST}.link'
@@ -266,8 +275,7 @@ class PythonEnvironment:
             ValueError: the machine lacks something that only its owner can give.
         """
         if self.ready():
-            first = self.checkout / _FIRST
-            if first.resolve() != self.venv.resolve() and not users_of(first):
+            if self._spare() or not (self.checkout / _FIRST).exists():
                 with self._alone():
                     self._settle()
             return
@@ -552,6 +560,10 @@ def users_of(venv: Path) -> list[int]:
             if program.startswith((inside, by_name)) or inside in (folder / 'maps').read_bytes():
                 found.append(int(folder.name))
     return found
+
+
+def _number_of_extras(venv: Path) -> int:
+    return len(SetUpJournal.read(venv).extras)
 
 
 def _link(source: str, target: str) -> None:

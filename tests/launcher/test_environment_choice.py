@@ -119,6 +119,25 @@ def test_the_link_leads_to_the_one_set_up_last_and_old_ones_go(
     assert not (checkout / '.venv.link').is_symlink()
 
 
+def test_of_two_complete_ones_the_one_with_less_goes_when_nobody_runs_in_it(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # What `test` leaves that was started beside a mission.
+    first = venv(checkout, '.venv')
+    second = venv(checkout, '.venv-3.11-1', 'test')
+    used = [first]
+    monkeypatch.setattr(module, 'users_of', lambda folder: [7] if folder in used else [])
+    environment = PythonEnvironment(checkout)
+    assert environment.venv == second
+    environment.prepare()
+    assert first.exists(), 'a mission runs in it'
+    used.clear()
+    environment.prepare()
+    assert first.is_symlink()
+    assert first.resolve() == second
+    assert [each.name for each in environment._folders()] == [second.name]
+
+
 def test_a_new_one_begins_with_what_the_one_in_use_has(
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
