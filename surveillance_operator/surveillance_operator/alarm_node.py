@@ -3,6 +3,10 @@
 Hears `incidents` and `/parameter_events`. What the launcher has to tell, which is no node, comes on
 the standard input, one line each (`IncidentUpdate.to_line`), and is published as the launcher's.
 The end of what a node that was started again tells of no more is published, too.
+
+The service `alarm/command` takes what people say of alarms (`desk.handling`), such as `acknowledge
+4f2a by Anna: I go there` or `shelve 4f2a 2 h`; `list`, `sinks` and `test SINK` ask for what is
+open, who is told, and a test message.
 """
 
 from __future__ import annotations
@@ -18,14 +22,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import qos_profile_parameter_events
 
+from state_machines.ros.waiting import reported
 from strict_files.files import FileError
 from strict_files.settings import parameter
+from strict_files.suggestions import nearest
+from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_ontology.patrol_vocabulary import ROBOT
 from surveillance_operator.notify.calls import Sinks, open_sinks, run_command
 from surveillance_operator.notify.incident_keeper import IncidentKeeper
@@ -77,8 +85,14 @@ class Alarm(PatrolNode):
         self._sinks = self._open_sinks(folder)
         self._of_others = IncidentPublisher(self)
         self._keeper = IncidentKeeper(
-            self._on_call, folder, self._mission_time, lost=self._of_others.publish
+            self._on_call,
+            folder,
+            self._mission_time,
+            lost=self._of_others.publish,
+            escalations=() if self._sinks is None else self._sinks.escalations,
+            warn=self._on_warning,
         )
+        self.create_service(ConsoleCommand, 'alarm/command', self._on_command)
         self._inbox = queue.Queue[Callable[[], object]](MOST_WAITING)
         self._allowed = Allowance(PARAMETERS_PER_SECOND, PARAMETERS_AT_ONCE)
         # Whose publisher told of what goes on, and what that node is called in the graph.
@@ -125,7 +139,8 @@ class Alarm(PatrolNode):
 
     # --- in the executor ---
 
-    def _take(self, work: Callable[[], object]) -> None:
+    def _take(self, work: Callable[[], object]) -> bool:
+        """Have the worker do something; return whether there was room for it."""
         try:
             self._inbox.put_nowait(work)
         except queue.Full:
@@ -133,6 +148,21 @@ class Alarm(PatrolNode):
                 f'more than {MOST_WAITING} messages wait: the rest is left out',
                 throttle_duration_sec=60.0,
             )
+            return False
+        return True
+
+    async def _on_command(self, request: Any, response: Any) -> Any:
+        """Have the worker do what a person says, whose book it is."""
+        future, work = reported(self, lambda: self._carry_out(request.line))
+        if not self._take(work):
+            response.answer = 'the node is busy: try again'
+            return response
+        try:
+            response.answer = str(await future)
+            response.accepted = True
+        except ValueError as error:
+            response.answer = str(error)
+        return response
 
     def _on_parameters(self, event: ParameterEvent) -> None:
         robot, _, node = event.node.strip('/').rpartition('/')
@@ -205,7 +235,34 @@ class Alarm(PatrolNode):
                 del self._tellers[owner]
                 self._keeper.restarted(owner)
 
+    def _carry_out(self, line: str) -> str:
+        """Do what a line says; return what was done.
+
+        Raises:
+            ValueError: What was wrong, and what was expected.
+        """
+        verb, _, rest = line.strip().partition(' ')
+        names = () if self._sinks is None else self._sinks.names
+        if verb == 'sinks':
+            return ', '.join(names) or 'none: start with --notify'
+        if verb != 'test':
+            return clean(self._keeper.carry_out(line))
+        name = rest.strip()
+        if self._sinks is None or name not in names:
+            raise ValueError(f'no sink {name[:40]!r}: expected {nearest(name[:40], names)}')
+        self._sinks.test(name)
+        return f'{name} is sent a test message'
+
+    def _on_warning(self, call: IncidentCall) -> None:
+        if self._sinks is not None:
+            self._sinks.tell(call)
+
     def _on_call(self, call: IncidentCall) -> None:
+        if call.only is not None:
+            # The log and the command have told of it already.
+            if self._sinks is not None:
+                self._sinks.tell(call)
+            return
         self.get_logger().always(f'alarm: {call.text}', LoggingSeverity.WARN)
         if self._settings.command and (
             problem := run_command(self._settings.command, clean(call.text))

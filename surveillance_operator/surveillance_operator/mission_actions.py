@@ -53,7 +53,7 @@ from surveillance_runtime.place_changes import description_text
 
 _DISCOVERY = 2.0
 """Seconds in which a node that has just started finds the services that there are."""
-_OPTIONAL = ('simulation/', 'observer/', 'move_arm')
+_OPTIONAL = ('simulation/', 'observer/', 'move_arm', 'alarm/')
 """How the names of services begin that a mission need not have."""
 _OFFERED_BY = {
     'simulation': ('simulator',),
@@ -72,6 +72,7 @@ _KINDS: Mapping[str, Any] = {
     'simulation/drain_battery': DrainBattery,
     'simulation/stage': ConsoleCommand,
     'observer/command': ConsoleCommand,
+    'alarm/command': ConsoleCommand,
     'ontology_map/set_place': ConsoleCommand,
     'ontology_map/add_room': AddRoom,
     'ontology_map/remove_room': RemoveRoom,
@@ -152,6 +153,10 @@ class MissionActions:
     def event(self, line: str) -> str:
         """Answer an event of the observer: `events`, `acknowledge 3`, `normal 3` or `false 3`."""
         return self._line('observer/command', line)
+
+    def alarm(self, line: str) -> str:
+        """Say something of an alarm to the node `alarm`, see `desk.handling`."""
+        return self._line('alarm/command', line)
 
     def drain_battery(self, percent: float) -> str:
         """Take charge out of the simulated battery."""

@@ -11,9 +11,10 @@ import secrets
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,21 +30,26 @@ from strict_files.regular_files import read_file
 from strict_files.settings import parameter
 from strict_files.suggestions import nearest
 from surveillance_ontology.patrol_vocabulary import checked_names
+from surveillance_operator.desk.alarm_actions import AlarmActions
+from surveillance_operator.desk.live_desk import LiveDesk
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_state import MissionState, Notice
+from surveillance_operator.page.access import Links, Person
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.sightings import Sightings
 from surveillance_runtime import parameter_checks
+from surveillance_runtime.event_log import EventLog, record_in
 from surveillance_runtime.launch_protocol import FOR_THE_TERMINAL, HEARTBEAT, NotNowError
 from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
+from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 
 POLL_PERIOD = 0.015
@@ -108,8 +114,24 @@ class MissionPage(PatrolNode):
             'blurred. Empty: none are shown.',
             read_only=True,
         )
+        folder = self.parameter(
+            'folder',
+            '',
+            'Folder of the run: what its logs hold, and those of the runs beside it, can be '
+            'searched, and what is pressed is written to its log. Empty: nothing is known of it.',
+            read_only=True,
+        )
+        links_file = self.parameter(
+            'links_file',
+            '',
+            'File with the names and roles of those who have links of their own, and the hashes '
+            'of their tokens; empty: links last as long as the node.',
+            read_only=True,
+        )
         self._sightings = Sightings(self, evidence_folder)
         self._broadcaster = Broadcaster()
+        self._desk = LiveDesk(Path(folder), self._broadcaster.show_desk) if folder else None
+        self._presses = PressLog(Path(folder) if folder else None, self.get_logger().warning)
         files = self.declare_fields(EditablePlace())
         self._cameras: dict[str, CameraPictures] = {'': CameraPictures(self)}
         self._subscriber = FleetSubscriber(
@@ -134,6 +156,8 @@ class MissionPage(PatrolNode):
                 origin=origin,
                 token=_kept_token(token_file),
                 report=self.get_logger().warning,
+                links=Links(Path(links_file) if links_file else None),
+                pressed=self._presses.write,
             )
         except OSError as error:
             raise NotNowError(str(error)) from error
@@ -145,11 +169,16 @@ class MissionPage(PatrolNode):
         if self.page.needs_token and HEARTBEAT in os.environ:
             print_lines(f'{FOR_THE_TERMINAL}with its token: {self.page.address}')
         self.spawn(self._tick, 'page')
+        if self._desk is not None:
+            self.spawn(partial(self._desk.follow, self.stopping.wait), 'desk')
+            self.spawn(partial(self._desk.read_older, self.stopping.is_set), 'older runs')
 
     def on_stop(self) -> None:
         """End the server, if there is one: its port may be taken."""
         if hasattr(self, 'page'):
             self.page.stop()
+        if hasattr(self, '_presses'):
+            self._presses.close()
         if self._own_token_file:
             Path(self._own_token_file).unlink(missing_ok=True)
 
@@ -210,6 +239,7 @@ class MissionPage(PatrolNode):
             'explain': lambda fact: {'ok': True, 'lines': actions.shared.explain(fact)},
             'why_not': why_not,
             'sightings': self._sightings.listed,
+            **({} if self._desk is None else self._desk.questions()),
         }
 
     def _offered_actions(self, session: EditSession | None) -> dict[str, Action]:
@@ -230,6 +260,23 @@ class MissionPage(PatrolNode):
             'command': self._of_robots(MissionActions.command),
             'event': self._of_robots(MissionActions.event),
             'fleet': self._tell_fleet,
+            **self._alarm_actions(),
+        }
+
+    def _alarm_actions(self) -> dict[str, Action]:
+        if self._desk is None:
+            return {}
+        alarms = AlarmActions(
+            self._desk.find,
+            self._actions.shared.alarm,
+            lambda robot, line: self._actions.of(robot).event(line),
+        )
+        return {
+            'alarm': alarms.say,
+            'mute': alarms.mute,
+            'unmute': alarms.unmute,
+            'test_sink': alarms.test,
+            'sinks': lambda: self._actions.shared.alarm('sinks'),
         }
 
     def _of_robots(self, do: Callable[..., str]) -> Action:
@@ -246,6 +293,45 @@ class MissionPage(PatrolNode):
         if word not in WORDS:
             raise ValueError(f'{word!r}: expected {nearest(word, WORDS)}')
         return self._actions.carry_out(robot, WORDS[word][1])
+
+
+class PressLog:
+    """Writes what was pressed, and by whom, to the log of the run.
+
+    Args:
+        folder: Of the run; None: nothing is written.
+        complain: Takes a line about a log that cannot be written.
+    """
+
+    def __init__(self, folder: Path | None, complain: Callable[[str], object]) -> None:
+        self._folder, self._complain = folder, complain
+        self._lock = threading.Lock()
+        self._log: EventLog | None = None
+
+    def write(self, person: Person, action: str, fields: Mapping[str, Any], said: str) -> None:
+        """Write one press."""
+        if self._folder is None:
+            return
+        try:
+            with self._lock:
+                if self._log is None:
+                    self._log = EventLog(record_in(self._folder))
+            given = {str(key)[:40]: str(value)[:200] for key, value in list(fields.items())[:20]}
+            self._log.write(
+                'press',
+                by=person.name,
+                role=person.role,
+                action=action,
+                answer=clean(said),
+                fields=given,
+            )
+        except FileError as error:
+            self._complain(str(error))
+
+    def close(self) -> None:
+        """Close the log."""
+        if self._log is not None:
+            self._log.close()
 
 
 class RoomChanges:

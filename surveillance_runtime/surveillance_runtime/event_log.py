@@ -142,6 +142,16 @@ KINDS: Mapping[str, EntryKind] = {
     'answer': EntryKind(
         ('line', 'answer'), is_of_mission=False, section=Section('Answers', ('line', 'answer'))
     ),
+    'handling': EntryKind(
+        ('id', 'verb', 'by', 'text'),
+        is_of_mission=False,
+        section=Section('What people did about alarms', ('verb', 'by', 'text')),
+    ),
+    'press': EntryKind(
+        ('by', 'role', 'action', 'answer'),
+        is_of_mission=False,
+        section=Section('Pressed on the page', ('by', 'role', 'action', 'answer')),
+    ),
     'restart': EntryKind(
         ('node', 'why'), is_of_mission=False, section=Section('Restarts', ('node', 'why'))
     ),

@@ -16,7 +16,7 @@ import json
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -340,6 +340,7 @@ class Incident:
 class _Open:
     incident: Incident
     next_call: float = 0.0
+    escalated: int = 0
     ends_at: float | None = None
     ending: str = ''
     is_lost: bool = False
@@ -351,14 +352,20 @@ class IncidentCall(NamedTuple):
     Attributes:
         text: One line.
         incident: What for.
-        number: The how manieth call for it, from 1.
+        number: The how manieth call for it, from 1; 0: nobody is called, it is for who wants to
+            know of warnings.
         over: Whether it is over.
+        reached: Whoever is called after so long or less is told, seconds without an
+            acknowledgement.
+        only: Alone those are told who are called after just so long; None: all of them.
     """
 
     text: str
     incident: Incident
     number: int
     over: bool
+    reached: float = 0.0
+    only: float | None = None
 
 
 class IncidentBook:
@@ -367,15 +374,22 @@ class IncidentBook:
     Args:
         call: Called with each call.
         note: Called with each incident that has begun, and again when it has ended.
+        is_quiet: Whether nobody is called for an incident at present, since a person wants it so.
+        escalations: After how long without an acknowledgement others are called, too, seconds,
+            ascending.
     """
 
     def __init__(
         self,
         call: Callable[[IncidentCall], object],
         note: Callable[[Incident], object] = lambda _i: None,
+        is_quiet: Callable[[Incident], bool] = lambda _i: False,
+        escalations: Sequence[float] = (),
     ) -> None:
         self._call = call
         self._note = note
+        self._is_quiet = is_quiet
+        self._escalations = tuple(escalations)
         self._open: dict[tuple[str, Cause], _Open] = {}
         self._over: dict[tuple[str, str], None] = {}
         self.past: list[Incident] = []
@@ -416,7 +430,13 @@ class IncidentBook:
         self.advance(now)
 
     def restore(
-        self, told: IncidentUpdate, began: float, calls: int, called: float, now: float
+        self,
+        told: IncidentUpdate,
+        began: float,
+        calls: int,
+        called: float,
+        now: float,
+        escalated: int = 0,
     ) -> None:
         """Take an incident that an earlier book had when its process ended.
 
@@ -428,12 +448,15 @@ class IncidentBook:
             calls: How often somebody was called.
             called: When that was last.
             now: Steady time, seconds.
+            escalated: How many escalations there were.
         """
         incident = Incident(told, began, calls=calls)
         next_call = called + _again(calls) if calls else now
         ending = 'it was not told again after a restart'
         ends_at = now + TOLD_AGAIN
-        self._open[told.owner, told.cause] = _Open(incident, next_call, ends_at, ending, True)
+        self._open[told.owner, told.cause] = _Open(
+            incident, next_call, escalated, ends_at, ending, True
+        )
 
     def forget(self, owner: str, *numbers: str) -> None:
         """Take that an incident is over: what is still heard of it is old.
@@ -467,6 +490,9 @@ class IncidentBook:
             if now >= each.next_call:
                 self._call_for(each, now)
             due.append(each.next_call)
+            while (at := self._escalates_at(each)) is not None and now >= at:
+                self._escalate(each, now)
+            due += [] if at is None else [at]
         return min(due, default=None)
 
     def close(self, now: float) -> None:
@@ -487,15 +513,33 @@ class IncidentBook:
         for each in alarms:
             told = each.incident.told
             # Who takes care of it need not be called again.
-            if not told.acknowledged_by and (told.cause.kind != CONSEQUENCE or not explained):
+            if told.acknowledged_by or self._is_quiet(each.incident):
+                continue
+            if told.cause.kind != CONSEQUENCE or not explained:
                 yield each
+
+    def _escalates_at(self, each: _Open) -> float | None:
+        """Return when others are called for an incident, too; None: all are."""
+        if each.escalated >= len(self._escalations):
+            return None
+        return each.incident.began + self._escalations[each.escalated]
+
+    def _escalate(self, each: _Open, now: float) -> None:
+        incident, after = each.incident, self._escalations[each.escalated]
+        each.escalated += 1
+        text = f'not acknowledged for {_span(now - incident.began)}: {incident.told.text}'
+        self._call(IncidentCall(text, incident, incident.calls, False, after, after))
+
+    def _reached(self, each: _Open) -> float:
+        return self._escalations[each.escalated - 1] if each.escalated else 0.0
 
     def _call_for(self, each: _Open, now: float) -> None:
         incident = each.incident
         since = f' (for {_span(now - incident.began)} now)' if incident.calls else ''
         each.next_call = now + _again(incident.calls + 1)
         each.incident = incident = replace(incident, calls=incident.calls + 1)
-        self._call(IncidentCall(incident.told.text + since, incident, incident.calls, over=False))
+        text, reached = incident.told.text + since, self._reached(each)
+        self._call(IncidentCall(text, incident, incident.calls, False, reached))
 
     def _finish(self, each: _Open, now: float) -> None:
         incident = replace(each.incident, ended=now, is_lost=each.is_lost)
@@ -510,7 +554,8 @@ class IncidentBook:
                 text = each.ending  # which says what it was, too
             ending = f': {each.ending}' if each.ending != text else ''
             all_clear = f'all clear after {lasted}: {text}{ending}'
-            self._call(IncidentCall(all_clear, incident, incident.calls, over=True))
+            reached = self._reached(each)
+            self._call(IncidentCall(all_clear, incident, incident.calls, True, reached))
 
 
 def _again(calls: int) -> float:

@@ -30,6 +30,8 @@ from surveillance_runtime.run_options import MUJOCO
 BEHAVIOUR_NODE = 'robot_behavior'
 PAGE = 'mission_page'
 OBSERVER = 'observer'
+PAGE_LINKS = 'page_links.json'
+"""Beside the runs: a link that somebody was given holds for the next run, too."""
 WATCHED_STAY = 30.0
 """With `--watch` the robot stays so long in each place unless somebody says otherwise, seconds: the
 usual stay is too short to look at anything."""
@@ -171,6 +173,8 @@ def page_entries(
         yield for_node(PAGE, 'place_file', str(place.resolve()), 'this run')
         yield for_node(PAGE, 'place_copy', str(folder.resolve() / PLACE), 'this run')
     # In a file, so that a page that is started again keeps it, and no peer can ask for it.
+    yield for_node(PAGE, 'folder', str(folder.resolve()), 'this run')
+    yield for_node(PAGE, 'links_file', str(folder.resolve().parent / PAGE_LINKS), 'this run')
     yield for_node(PAGE, 'token_file', str(folder.resolve() / 'page_token'), 'this run')
     if address is not None:
         host, port = page_address(address)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from surveillance_operator.notify.notification import notification_of
+from surveillance_operator.notify.notification import Notification, notification_of
 from surveillance_operator.notify.outbox import Outbox
 from surveillance_operator.notify.sinks import read_notify_file, sink_of
 from surveillance_runtime.incidents import IncidentCall
@@ -38,11 +38,17 @@ class Sinks(NamedTuple):
 
     Attributes:
         outbox: What waits for them.
-        tell: Hands a call to them.
+        tell: Hands a call to those that it is for.
+        names: Of all.
+        escalations: After how long without an acknowledgement some are told, seconds, ascending.
+        test: Hands a test message to the one of a name.
     """
 
     outbox: Outbox
     tell: Callable[[IncidentCall], object]
+    names: tuple[str, ...] = ()
+    escalations: tuple[float, ...] = ()
+    test: Callable[[str], object] = lambda _name: None
 
 
 def open_sinks(
@@ -66,7 +72,8 @@ def open_sinks(
         ValueError: A sink needs a package that is not installed.
         OSError: The outbox cannot be made.
     """
-    sinks = {each.name: sink_of(each) for each in read_notify_file(file)}
+    settings = {each.name: each for each in read_notify_file(file)}
+    sinks = {name: sink_of(each) for name, each in settings.items()}
     outbox = Outbox(folder / OUTBOX, sinks, report, trouble=trouble)
     outbox.start()
 
@@ -74,6 +81,16 @@ def open_sinks(
         own = call.incident.told.robot
         of_member = folder / own / EVIDENCE
         evidence = of_member if own and of_member.is_dir() else folder / EVIDENCE
-        outbox.put(notification_of(call, own or robot, time.time(), evidence))
+        now = time.time()
+        takers = [name for name, each in settings.items() if each.takes.takes(call, now)]
+        if takers:
+            outbox.put(notification_of(call, own or robot, now, evidence), takers)
 
-    return Sinks(outbox, tell)
+    def test(name: str) -> None:
+        now = time.time()
+        words = f'{robot}: this is a test message, nothing has happened'
+        key = f'test {name} {now:.3f}'
+        outbox.put(Notification(key, words, 'test', name, 'alarm', robot, False, now), [name])
+
+    escalations = sorted({each.takes.after for each in settings.values()} - {0.0})
+    return Sinks(outbox, tell, tuple(settings), tuple(escalations), test)

@@ -96,7 +96,8 @@ def notification_of(
     pictures: tuple[str, ...] = ()
     if evidence is not None:
         pictures = tuple(str(evidence / Path(name).name) for name in told.evidence)
-    named = told.node, *told.cause, told.text, str(call.number), str(call.over)
+    only = '' if call.only is None else f'{call.only:g}'
+    named = told.node, *told.cause, told.text, str(call.number), str(call.over), only
     # Of the same hour: what is started again tells of what it finds again.
     key = hashlib.sha256('\n'.join((robot, *named, f'{at // 3600:.0f}')).encode()).hexdigest()[:24]
     return Notification(

@@ -13,7 +13,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -126,13 +126,20 @@ class Outbox:
         for thread in self._threads:
             thread.start()
 
-    def put(self, notification: Notification) -> bool:
-        """Take one for all sinks; return whether it is new. Never waits for a sink."""
+    def put(self, notification: Notification, only: Container[str] | None = None) -> bool:
+        """Take one; return whether it is new. Never waits for a sink.
+
+        Args:
+            notification: The notification.
+            only: The names of the sinks that it is for; None: all.
+        """
         with self._changed:
             if notification.key in self._known:
                 return False
             self._known.append(notification.key)
             for queue in self._queues:
+                if only is not None and queue.name not in only:
+                    continue
                 self._number += 1
                 path = queue.folder / f'{self._now():017.6f}_{self._number:06d}.json'
                 _write(path, notification.kept(), self._report)

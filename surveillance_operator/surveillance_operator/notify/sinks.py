@@ -6,6 +6,10 @@
       guard: {email: guard@example.org, from: robot@example.org, smtp: smtps://mail.example.org,
               user: robot, password_file: /etc/patrol/mail}
       lamp: {command: /usr/local/bin/blink, pictures: none}
+      boss: {email: boss@example.org, ..., kinds: [person], hours: daily 20:00-06:00, after: 10 min}
+
+Each is told of alarms. `severity: warning` tells of warnings, too; `kinds`, `hours` and `after` say
+of what, when, and that nobody has acknowledged it for so long.
 
 Secrets are never in it: a file or an environment variable holds them, and is read for each try.
 
@@ -29,16 +33,20 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime
 from email.message import EmailMessage
 from email.utils import formatdate
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from patrol_policy.hours import WeeklyHours
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import EntryError, read_table
+from surveillance_operator.desk.handling import kinds_of
 from surveillance_operator.notify.notification import Notification, as_base64
 from surveillance_operator.notify.outbox import Deliver, DeliveryError
+from surveillance_runtime.incidents import IncidentCall, Severity
 from surveillance_runtime.one_line import clean
 
 PICTURES = ('blurred', 'sharp', 'none')
@@ -76,6 +84,36 @@ class Secret:
 
 
 @dataclass(frozen=True)
+class Takes:
+    """Of what a sink is told.
+
+    Attributes:
+        severity: The least.
+        kinds: Of the cause, or of what was seen; empty: all.
+        hours: When; None: always.
+        after: For how long nobody has acknowledged it, seconds.
+    """
+
+    severity: Severity = Severity.ALARM
+    kinds: tuple[str, ...] = ()
+    hours: WeeklyHours | None = None
+    after: float = 0.0
+
+    def takes(self, call: IncidentCall, at: float) -> bool:
+        """Tell whether a call at a time, seconds since 1970, is for it."""
+        told = call.incident.told
+        if self.severity is Severity.ALARM and not call.number:
+            return False
+        if self.kinds and not set(self.kinds).intersection(kinds_of(told)):
+            return False
+        if call.only is not None and self.after != call.only:
+            return False
+        if self.after > call.reached:
+            return False
+        return self.hours is None or self.hours.at(datetime.fromtimestamp(at)) == 'must'
+
+
+@dataclass(frozen=True)
 class SinkSettings:
     """One sink.
 
@@ -89,6 +127,7 @@ class SinkSettings:
         topic: Of MQTT.
         sender, receivers: Of e-mail.
         pictures: blurred: what shows a person or face is blurred; sharp; none.
+        takes: Of what it is told.
     """
 
     name: str
@@ -101,6 +140,7 @@ class SinkSettings:
     sender: str = ''
     receivers: tuple[str, ...] = ()
     pictures: str = 'blurred'
+    takes: Takes = Takes()
 
 
 TIMEOUT = 10.0
@@ -372,7 +412,7 @@ def _command_of(settings: SinkSettings, entry: Entry) -> SinkSettings:
 def _needs_mqtt() -> str:
     if mqtt is not None:
         return ''
-    return 'mqtt: expected the package paho-mqtt (pip install "surveillance[notify]")'
+    return 'mqtt: expected the package paho-mqtt (.venv/bin/python -m pip install paho-mqtt)'
 
 
 @dataclass(frozen=True)
@@ -441,7 +481,7 @@ def sink_from(name: str, entry: Entry) -> SinkSettings:
     if len(kinds) != 1:
         raise ValueError(f'expected one of {", ".join(SINKS)}, got {len(kinds)} of them')
     kind = SINKS[kinds[0]]
-    allowed = (*kind.keys, 'pictures')
+    allowed = (*kind.keys, 'pictures', *FILTERS)
     for key in entry:
         if key in ('password', 'token'):
             raise EntryError(key, f'a secret must not stand here, expected {key}_file or {key}_env')
@@ -451,7 +491,41 @@ def sink_from(name: str, entry: Entry) -> SinkSettings:
     if pictures not in PICTURES:
         raise ValueError(f'pictures: got {pictures!r}, expected {nearest(pictures, PICTURES)}')
     secret = secret_in(entry, kind.secret) if kind.secret else None
-    return kind.read(SinkSettings(name, kinds[0], secret=secret, pictures=pictures), entry)
+    takes = _takes_of(entry)
+    return kind.read(
+        SinkSettings(name, kinds[0], secret=secret, pictures=pictures, takes=takes), entry
+    )
+
+
+FILTERS = ('severity', 'kinds', 'hours', 'after')
+_UNITS = {'s': 1.0, 'min': 60.0, 'h': 3600.0}
+
+
+def _takes_of(entry: Entry) -> Takes:
+    """Return of what a sink is told.
+
+    Raises:
+        EntryError: What was wrong, and what was expected.
+    """
+    severity = str(entry.get('severity', Severity.ALARM))
+    if severity not in list(Severity):
+        raise EntryError('severity', f'got {severity!r}, expected {nearest(severity, Severity)}')
+    kinds = entry.get('kinds', [])
+    if not isinstance(kinds, list) or not all(isinstance(each, str) for each in kinds):
+        raise EntryError('kinds', f'got {kinds!r}, expected a list such as [person, door]')
+    hours, after = None, 0.0
+    if 'hours' in entry:
+        text = str(entry['hours'])
+        try:
+            hours = WeeklyHours.parse(f'daily {text}' if re.match(r'\d', text) else text)
+        except ValueError as error:
+            raise EntryError('hours', str(error)) from None
+    if 'after' in entry:
+        match = re.fullmatch(r'(\d+(?:\.\d+)?) ?(s|min|h)', str(entry['after']))
+        if match is None:
+            raise EntryError('after', f"got {entry['after']!r}, expected such as '10 min'")
+        after = float(match[1]) * _UNITS[match[2]]
+    return Takes(Severity(severity), tuple(kinds), hours, after)
 
 
 def sink_of(settings: SinkSettings) -> Deliver:

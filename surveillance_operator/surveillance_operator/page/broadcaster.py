@@ -31,7 +31,7 @@ PER_VIEWER = 0.002
 """The same for each viewer that there is, seconds: many are told more seldom."""
 HEARTBEAT = 2.0
 """Seconds after which a viewer is told the time at least."""
-OF_ALL = frozenset({'events', 'replay'})
+OF_ALL = frozenset({'events', 'replay', 'desk'})
 """Parts that are not of one robot."""
 
 Texts = dict[str, tuple[int, str]]
@@ -92,6 +92,13 @@ class Broadcaster:
             shown.now = shown.now if now is None else now
             everything = {**dict.fromkeys(PARTS), 'trail': [], **parts}
             self._accept(robot, everything if whole else parts)
+        self._rouse()
+
+    def show_desk(self, part: Any) -> None:
+        """Take what is open on the desk, which is of all robots; from any thread."""
+        with self._lock:
+            self._version += 1
+            self._of_all['desk'] = self._version, _text(part)
         self._rouse()
 
     def forget(self, robot: str) -> None:

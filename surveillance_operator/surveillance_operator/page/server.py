@@ -2,7 +2,11 @@
 
 On the loopback address everybody on this machine may look. Elsewhere a token is needed: the address
 that is printed holds it once, and it becomes a cookie. Whatever changes something needs the token
-in any case, comes from the page's own origin, and only where control was switched on.
+in any case, comes from the page's own origin, and only where control was switched on. Further links
+have tokens and roles of their own (`page.access`).
+
+`/ask/NAME`, `/act/NAME`, `/get/NAME` and `/events` are the page's own interface; `/openapi.json`
+describes it as it is served (`page.api`).
 
 Behind a proxy that adds TLS, browsers know the page by another origin (`https://robot.example.org`),
 which is told by its option. Then everybody needs the token, also to look: requests of anybody come
@@ -13,17 +17,17 @@ from __future__ import annotations
 
 import asyncio
 import inspect
-import ipaddress
 import logging
-import secrets
 import socket
 import threading
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
@@ -32,7 +36,6 @@ from starlette.requests import Request
 from starlette.responses import (
     JSONResponse,
     PlainTextResponse,
-    RedirectResponse,
     Response,
     StreamingResponse,
 )
@@ -41,15 +44,26 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from state_machines.exceptions import CallError
+from strict_files.files import in_one_line
 from strict_files.regular_files import parse_json
 from strict_files.suggestions import nearest
+from surveillance_operator.page.access import (
+    GUARD,
+    HOLDER,
+    NOBODY,
+    OPERATOR,
+    Links,
+    Person,
+    least_role,
+)
+from surveillance_operator.page.api import description
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.connections import (
     SEND_BUFFER,
     BoundedConnection,
     most_connections,
 )
-from surveillance_runtime import parameter_checks
+from surveillance_operator.page.gate import Gate
 
 STATIC = Path(__file__).with_name('static')
 LONGEST_BODY = 65_536
@@ -62,13 +76,38 @@ HEADERS = {
     'Cache-Control': 'no-store',
 }
 
+DOCUMENT_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+UNTOLD = ('drive', 'links')
+"""Actions that are in no log: a stick that is held sends ten a second."""
+LINK_PERIOD = 2.0
+"""Seconds after which it is seen that a link was taken back, in a stream that goes on."""
 STOPPING = ('stop', 'fleet')
 """Actions that have threads of their own: whatever else keeps the others busy, a robot stops."""
 
 
 Action = Callable[..., Any]
 """Takes a request's fields by name; returns what came of it, or raises `ValueError` or `CallError`
-with one line."""
+with one line. One that takes `by` is told who sends it."""
+Pressed = Callable[[Person, str, Mapping[str, Any], str], object]
+"""Told of an action: who, its name, its fields, what came of it."""
+
+
+@dataclass(frozen=True)
+class Document:
+    """A file that is made when somebody asks for it.
+
+    Attributes:
+        content: What is in it.
+        kind: Its media type.
+        name: What a browser saves it as; empty: it shows it.
+    """
+
+    content: bytes
+    kind: str
+    name: str = ''
 
 
 class Page:
@@ -91,6 +130,10 @@ class Page:
         longest: Bytes of the longest request of an action that may have more than others.
         report: Told one line about a request that failed, and about what was no request of HTTP;
             keep the number of lines small, anybody can send them.
+        documents: Files that are made for whoever may look, by name; one that takes `leaves` is
+            told whether what it gives leaves this machine.
+        links: Who has links of their own; None: nobody.
+        pressed: Told of each action that somebody was allowed.
 
     Raises:
         OSError: The address cannot be used.
@@ -113,23 +156,24 @@ class Page:
         front: str = 'index.html',
         longest: Mapping[str, int] | None = None,
         report: Callable[[str], Any] = lambda _: None,
+        documents: Mapping[str, Action] | None = None,
+        links: Links | None = None,
+        pressed: Pressed = lambda _who, _action, _fields, _said: None,
     ) -> None:
         self._broadcaster = broadcaster
-        self._questions, self._actions = questions, actions
+        self._pressed = pressed
+        self._documents = documents or {}
         self._picture = picture
         self._evidence_of = evidence
         self._replay = replay
         self._front = front
         self._longest = longest or {}
-        self.token = token or secrets.token_urlsafe(24)
         self._socket = _bound(host, port)
         self.port: int = self._socket.getsockname()[1]
-        self._host = host
-        if expected := parameter_checks.web_origin(origin):
-            raise ValueError(f'{origin!r}: expected {expected}')
-        self._origin = origin.rstrip('/').lower()
-        self._is_local = _is_loopback(host) and not self._origin
-        self._cookie = f'mission_{self.port}'
+        self._gate = Gate(host, self.port, origin, token, links)
+        self.token = self._gate.token
+        own = self._gate.link_actions() if actions and not replay else {}
+        self._questions, self._actions = questions, {**actions, **own}
         routes = [
             Route('/', self._index),
             Route('/edit', self._edit),
@@ -137,10 +181,13 @@ class Page:
             Route('/camera.jpg', self._camera),
             Route('/evidence/{name}', self._evidence),
             Route('/ask/{name}', self._ask),
+            Route('/get/{name}', self._get),
+            Route('/metrics', self._metrics),
+            Route('/openapi.json', self._openapi),
             Route('/act/{name}', self._act, methods=['POST']),
             Mount('/static', StaticFiles(directory=STATIC)),
         ]
-        app = _Guard(Starlette(routes=routes), self._refusal, report)
+        app = _Guard(Starlette(routes=routes), self._gate.refusal, report)
         _report_for_uvicorn(report)
         connection = type('Connection', (BoundedConnection,), {'most': most_connections()})
         config = uvicorn.Config(
@@ -160,7 +207,7 @@ class Page:
     @property
     def needs_token(self) -> bool:
         """Whether some of what it offers needs the token."""
-        return not self._is_local or bool(self._actions and not self._replay)
+        return not self._gate.is_local or bool(self._actions and not self._replay)
 
     @property
     def address(self) -> str:
@@ -170,12 +217,7 @@ class Page:
     @property
     def open_address(self) -> str:
         """Where to look, without the token."""
-        if self._origin:
-            return f'{self._origin}/'
-        shown = f'[{self._host}]' if ':' in self._host else self._host
-        if self._host in ('0.0.0.0', '::'):
-            shown = socket.gethostname()
-        return f'http://{shown}:{self.port}/'
+        return self._gate.address
 
     def start(self) -> None:
         """Serve on a thread of its own."""
@@ -194,37 +236,9 @@ class Page:
         if self._thread is not None:
             self._thread.join(3.0)
 
-    def _refusal(self, request: Request) -> tuple[int, str] | None:
-        """Say with which status and why a request may not even look; None when it may."""
-        try:
-            host = urlsplit(f'//{request.headers.get("host", "")}').hostname or ''
-        except ValueError:  # brackets that are not closed
-            return 400, 'the Host of this request is no name and no address'
-        # Another site's name that leads here would make a browser send that site's requests.
-        if self._is_local and host != 'localhost' and not _is_loopback(host):
-            return 403, f'host {host[:80]!r} is not this page'
-        if not self._is_local and not self._has_token(request):
-            return 403, 'a token is needed: open the address that the mission printed'
-        return None
-
-    def _has_token(self, request: Request) -> bool:
-        given = request.query_params.get('token') or request.cookies.get(self._cookie, '')
-        return secrets.compare_digest(given.encode(), self.token.encode())
-
     async def _index(self, request: Request) -> Response:
         if 'token' in request.query_params:
-            if not self._has_token(request):
-                return PlainTextResponse('this token is not valid any more', 403)
-            answer = RedirectResponse('/', 303)
-            answer.set_cookie(
-                self._cookie,
-                self.token,
-                httponly=True,
-                samesite='strict',
-                secure=self._origin.startswith('https:'),
-                max_age=30 * 86400,
-            )
-            return answer
+            return self._gate.entered(request)
         return self._document(request, self._front)
 
     async def _edit(self, request: Request) -> Response:
@@ -235,11 +249,16 @@ class Page:
     def _document(self, request: Request, name: str) -> Response:
         text = (STATIC / name).read_text(encoding='utf-8')
         kind = 'replay' if self._replay else 'live'
-        may_act = bool(self._actions) and (self._replay or self._has_token(request))
-        may_edit = may_act and 'place' in self._questions
+        person = self._gate.person(request) or NOBODY
+        may_act = bool(self._actions) and (self._replay or person.may(GUARD))
+        is_operator = self._replay or person.may(OPERATOR)
+        may_edit = may_act and is_operator and 'place' in self._questions
         shown = {
             'kind': kind,
-            'control': int(may_act),
+            'control': int(may_act and is_operator),
+            'guard': int(may_act),
+            'who': escape(person.name, quote=True),
+            'role': person.role,
             'edit': int(may_edit),
             'imports': int(may_edit and 'import_map' in self._actions),
             'live': int(self._front != name),
@@ -251,7 +270,22 @@ class Page:
 
     async def _events(self, request: Request) -> Response:
         stream = self._broadcaster.stream(request.query_params.get('robot'))
+        person = self._gate.person(request)
+        if person not in (None, HOLDER):
+            stream = self._while_valid(stream, request)
         return StreamingResponse(stream, media_type='text/event-stream')
+
+    async def _while_valid(
+        self, stream: AsyncIterator[str], request: Request
+    ) -> AsyncIterator[str]:
+        """Yield what a stream does until the link of who reads it is taken back."""
+        looked = time.monotonic()
+        async for each in stream:
+            if (now := time.monotonic()) - looked > LINK_PERIOD:
+                looked = now
+                if self._gate.person(request) is None:
+                    return
+            yield each
 
     async def _camera(self, request: Request) -> Response:
         image = await run_in_threadpool(self._picture, request.query_params.get('robot', ''))
@@ -261,7 +295,7 @@ class Page:
 
     async def _evidence(self, request: Request) -> Response:
         name, robot = request.path_params['name'], request.query_params.get('robot', '')
-        image = await run_in_threadpool(self._evidence_of, name, robot, not self._is_local)
+        image = await run_in_threadpool(self._evidence_of, name, robot, not self._gate.is_local)
         if image is None:
             return PlainTextResponse('no such picture', 404)
         return Response(image, media_type='image/jpeg')
@@ -271,6 +305,40 @@ class Page:
         if question is None:
             return PlainTextResponse('no such question', 404)
         return await _answered(question, dict(request.query_params))
+
+    async def _get(self, request: Request) -> Response:
+        name = request.path_params['name']
+        make = self._documents.get(name)
+        if make is None:
+            expected = nearest(name[:80], self._documents)
+            return PlainTextResponse(f'no document {name[:80]!r}, expected {expected}', 404)
+        fields: dict[str, Any] = dict(request.query_params)
+        fields.pop('token', None)
+        if 'leaves' in inspect.signature(make).parameters:
+            fields['leaves'] = not self._gate.is_local
+        try:
+            inspect.signature(make).bind(**fields)
+            made = await run_in_threadpool(make, **fields)
+        except (ValueError, TypeError, CallError, OSError) as error:
+            said = in_one_line(error) if isinstance(error, OSError) else str(error)
+            return PlainTextResponse(said, 422)
+        headers = {}
+        if made.name:
+            headers['Content-Disposition'] = f'attachment; filename="{made.name}"'
+        if made.kind.startswith('text/html'):
+            # What it says was made by programs; its style is its own.
+            headers['Content-Security-Policy'] = DOCUMENT_POLICY
+        return Response(made.content, media_type=made.kind, headers=headers)
+
+    async def _metrics(self, request: Request) -> Response:
+        make = self._documents.get('metrics')
+        if make is None:
+            return PlainTextResponse('no metrics here', 404)
+        made = await run_in_threadpool(make)
+        return Response(made.content, media_type=made.kind)
+
+    async def _openapi(self, request: Request) -> Response:
+        return JSONResponse(description(self._questions, self._actions, self._documents))
 
     async def _act(self, request: Request) -> Response:
         name = request.path_params['name']
@@ -284,14 +352,10 @@ class Page:
             return JSONResponse(
                 {'ok': False, 'text': f'no action {name[:80]!r}, expected {expected}'}, 404
             )
-        origin = request.headers.get('origin', '')
-        own = self._origin or f'http://{request.headers.get("host", "")}'
-        if origin != own:
-            # The browser says where the person looks: the one value that the option has to have.
-            known = urlsplit(origin).scheme in ('http', 'https') and len(origin) < 300
-            hint = f'; behind a proxy start with --web-origin {origin}' if known else ''
-            return JSONResponse({'ok': False, 'text': f'refused: not from this page{hint}'}, 403)
-        if not self._replay and not self._has_token(request):
+        if problem := self._gate.foreign(request):
+            return JSONResponse({'ok': False, 'text': problem}, 403)
+        person = HOLDER if self._replay else self._gate.person(request)
+        if person is None:
             text = 'refused: open the address with the token that the mission printed'
             return JSONResponse({'ok': False, 'text': text}, 403)
         body = bytearray()
@@ -309,7 +373,19 @@ class Page:
             given = None
         if not isinstance(given, dict):
             return JSONResponse({'ok': False, 'text': 'expected a JSON object'}, 400)
-        return await _answered(action, given, self._stop_threads if name in STOPPING else None)
+        if not person.may(wanted := least_role(name, given)):
+            text = f'refused: {person.name} is a {person.role}, this takes a {wanted}'
+            return JSONResponse({'ok': False, 'text': text}, 403)
+        if 'by' in inspect.signature(action).parameters:
+            given['by'] = person.name
+        answer = await _answered(action, given, self._stop_threads if name in STOPPING else None)
+        if not self._replay and name not in UNTOLD:
+            said = parse_json(bytes(answer.body)).get('text', '')
+            # The robot stops though the disk is full and waits.
+            asyncio.get_running_loop().run_in_executor(
+                None, self._pressed, person, name, given, str(said)
+            )
+        return answer
 
 
 class _Guard:
@@ -335,6 +411,8 @@ class _Guard:
             begun = True
             if message['type'] == 'http.response.start':
                 extra = [(k.lower().encode(), v.encode()) for k, v in HEADERS.items()]
+                known = {key.lower() for key, _ in message.get('headers', [])}
+                extra = [each for each in extra if each[0] not in known]
                 message['headers'] = [*message.get('headers', []), *extra]
             await send(message)
 
@@ -383,13 +461,6 @@ def _report_for_uvicorn(report: Callable[[str], Any]) -> None:
     logger = logging.getLogger('uvicorn.error')
     logger.handlers[:] = [_OneLine(report)]
     logger.propagate = False
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == 'localhost'
 
 
 def _bound(host: str, port: int) -> socket.socket:
