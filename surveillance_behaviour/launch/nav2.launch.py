@@ -24,7 +24,7 @@ from launch.substitutions import LaunchConfiguration
 
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.profile import find_profile, read_profile
+from surveillance_runtime.profile import find_profile, out_of_nav2s_way, read_profile
 from surveillance_runtime.profile.nav2_parameters import laid_over
 
 _SWITCH = ['false', 'true']
@@ -103,6 +103,8 @@ def include(context: LaunchContext) -> list[IncludeLaunchDescription]:
             'robot': given['robot'],
             'map': given['map'],
             'params': str(clock),
+            # Nav2 has these names, too.
+            'remap': ','.join(f'{old}:={new}' for old, new in out_of_nav2s_way().items()),
             # Nav2's own collision monitor stands before the base.
             'without': 'collision_monitor',
         }

@@ -193,6 +193,13 @@ class MotionSettings(PeerSettings, StationSettings):
         choices=('none', 'opennav'),
     )
     dock_type: str = parameter('', "The dock's type, as the docking server knows it.")
+    dock_staging: float = parameter(
+        0.0,
+        'How far before its dock the robot is brought, m; 0: the docking server brings it to its '
+        'staging pose, by Nav2 (0.7 where this node drives).',
+        0.0,
+        5.0,
+    )
     feedback_period: float = parameter(0.2, 'Time between two feedbacks on the way, s.', 0.01, 60.0)
     place_reach: float = parameter(
         2.0,

@@ -147,7 +147,7 @@ class Explorer(PatrolNode):
             self._map_frame = MapFrame(self, self._frames)
         else:
             self._follow_foreign()
-        self._odometer = OdometryReader(self, self._on_odometry)
+        self._odometer = OdometryReader(self, self._on_odometry, self._frames)
         self._lidar.subscribe(self._on_scan)
         self._watch = SensorWatch(
             self,

@@ -67,7 +67,8 @@ class MotionController(PatrolNode):
     def _make_robot(self) -> BaseMotion:
         """Return the way to move that the parameters ask for."""
         # Only here, for the libraries behind it take their time to import.
-        from surveillance_controllers.motion.nav2 import DockingMotion, Nav2Motion
+        from surveillance_controllers.motion.docking import DockingMotion
+        from surveillance_controllers.motion.nav2 import Nav2Motion
         from surveillance_controllers.motion.navigation_motion import NavigationMotion
 
         settings = self._settings

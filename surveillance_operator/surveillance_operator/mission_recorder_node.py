@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -34,6 +35,7 @@ from surveillance_operator.recording.bag import (
 )
 from surveillance_operator.recording.schemas import definition, message_class
 from surveillance_operator.recording.timeline import TimelineWriter
+from surveillance_runtime.graph_check import endpoints_of, type_clashes
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
@@ -44,6 +46,7 @@ DRAIN_PERIOD, SEAL_PERIOD, STATE_PERIOD = 0.15, 0.6, 0.4
 PRUNE_PERIOD = 60.0
 RETRY_PERIOD = 3.0
 """Seconds after which a recording that could not be written is tried again."""
+OWN = 'surveillance_interfaces/'
 DISK_FULL = errno.ENOSPC, errno.EDQUOT
 QUEUE = 2000
 """Messages of one topic that may come within `DRAIN_PERIOD`; a latched topic brings its own."""
@@ -96,6 +99,7 @@ class MissionRecorder(PatrolNode):
                 raise NotNowError(f'parameter folder: {in_one_line(error)}') from error
         self._images = ImageRecorder(self, self._bag, image_period)
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
+        self._clashes: set[str] = set()
         self._unknown: set[str] = set()
         self._subscriber = MissionSubscriber(self, STATE_PERIOD)
         self.spawn(self._record, 'recording')
@@ -166,7 +170,9 @@ class MissionRecorder(PatrolNode):
                 )
 
     def _find_topics(self) -> None:
-        for topic, types in self.get_topic_names_and_types():
+        found = self.get_topic_names_and_types()
+        self._look_for_clashes([topic for topic, types in found if len(types) > 1])
+        for topic, types in found:
             if topic in self._subscriptions_by_topic or topic in self._unknown:
                 continue
             if topic.startswith(self._left_out):
@@ -177,7 +183,18 @@ class MissionRecorder(PatrolNode):
                 if each.node_name != self.get_name()
             ]
             if offers:
-                self._follow(topic, types[0], offers)
+                # Of two types that of this project, which this process hears in any case.
+                kind = next((each for each in types if each.startswith(OWN)), types[0])
+                self._follow(topic, kind, offers)
+
+    def _look_for_clashes(self, topics: Sequence[str]) -> None:
+        """Tell of topics that have more than one type, and of those that have not any more."""
+        clashes = type_clashes(endpoints_of(self, topics)) if topics else {}
+        for topic, text in clashes.items():
+            self.incidents.begin(('topic', topic), text)
+        for topic in self._clashes - clashes.keys():
+            self.incidents.end(('topic', topic), f'{topic} has one type')
+        self._clashes = set(clashes)
 
     def _follow(self, topic: str, kind: str, offers: Sequence[Any]) -> None:
         if kind in KINDS and not self._all_images:
@@ -198,9 +215,10 @@ class MissionRecorder(PatrolNode):
                 TopicType(topic, kind, definition(kind), reliable, latched, depth, type_hash)
             )
             subscription = PolledSubscription(self, message_class(kind), topic, qos, raw=True)
-        except ValueError as error:
+        except (ValueError, _rclpy.RCLError) as error:
+            # The middleware refuses a second type on a topic that this process has already.
             self._unknown.add(topic)
-            self.get_logger().warn(f'topic {topic} is not recorded: {error}')
+            self.get_logger().warn(f'topic {topic} is not recorded: {" ".join(str(error).split())}')
             return
         self._subscriptions_by_topic[topic] = subscription
 

@@ -31,11 +31,18 @@ except ImportError:
     TFMessage = None
 
 
-def endpoints_of(node: Node) -> GraphSample:
-    """Return who publishes and who subscribes what, without what the node itself does."""
+def endpoints_of(node: Node, topics: Iterable[str] | None = None) -> GraphSample:
+    """Return who publishes and who subscribes what, without what the node itself does.
+
+    Args:
+        node: Who looks.
+        topics: The topics; None: all that there are.
+    """
     publishers: dict[str, list[Endpoint]] = {}
     subscribers: dict[str, list[Endpoint]] = {}
-    for topic, _ in node.get_topic_names_and_types():
+    if topics is None:
+        topics = [topic for topic, _ in node.get_topic_names_and_types()]
+    for topic in topics:
         for found, infos in (
             (publishers, node.get_publishers_info_by_topic(topic)),
             (subscribers, node.get_subscriptions_info_by_topic(topic)),
@@ -48,12 +55,34 @@ def endpoints_of(node: Node) -> GraphSample:
 
 def _endpoint(info: Any) -> Endpoint:
     quality = info.qos_profile
+    name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
     return Endpoint(
-        f'{info.node_namespace.rstrip("/")}/{info.node_name}',
+        # The graph knows endpoints before it knows whose they are.
+        'a node whose name is not known yet' if '_UNKNOWN_' in name else name,
         info.topic_type.replace('/msg/', '/'),
         quality.reliability == ReliabilityPolicy.RELIABLE,
         quality.durability == DurabilityPolicy.TRANSIENT_LOCAL,
     )
+
+
+def type_clashes(seen: GraphSample) -> dict[str, str]:
+    """Return each topic that has more than one type, with who has which, in words.
+
+    An action's topics are among them: two servers of one name and different types.
+    """
+    found = {}
+    for topic in {*seen.publishers, *seen.subscribers}:
+        owners: dict[str, set[str]] = {}
+        for end in (*seen.publishers.get(topic, ()), *seen.subscribers.get(topic, ())):
+            owners.setdefault(end.type, set()).add(end.node)
+        if len(owners) > 1:
+            said = [f'{kind} of {", ".join(sorted(owners[kind]))}' for kind in sorted(owners)]
+            found[topic] = (
+                f'{topic} has more than one type: {"; ".join(said)}: expected one; give one of '
+                'them another name or namespace (dock.navigator: nav2 in the profile does it for '
+                "Nav2's names)"
+            )
+    return found
 
 
 class Listener:

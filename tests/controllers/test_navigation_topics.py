@@ -285,7 +285,7 @@ def test_a_lidar_s_mount_comes_from_the_static_transforms(graph: Any, capfd: Any
         transforms.append(step)
     transforms.append(TransformStamped(child_frame_id='b'))
     transforms[-1].header.frame_id = 'a'
-    frames._on_static(SimpleNamespace(transforms=transforms))
+    frames.frames.hear_fixed(SimpleNamespace(transforms=transforms))
     assert frames.mount_of('laser').pose == pytest.approx((0.3, 0.0, 0.0))
     assert frames.mount_of('/laser') == frames.mount_of('laser')
     assert frames.mount_of('robot2/base_link') == Mount()
@@ -310,7 +310,7 @@ def test_a_lidar_below_tilted_frames_is_looked_up_in_space(graph: Any, capfd: An
         step.header.frame_id = parent
         step.transform.translation.x, step.transform.rotation = x, turn
         transforms.append(step)
-    frames._on_static(SimpleNamespace(transforms=transforms))
+    frames.frames.hear_fixed(SimpleNamespace(transforms=transforms))
     pose, upside_down = frames.mount_of('hanging')
     assert pose == pytest.approx((0.4, 0.0, -math.pi / 2))
     assert upside_down

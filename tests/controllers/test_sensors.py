@@ -101,7 +101,7 @@ def test_a_scan_waits_a_while_for_where_its_frame_is(graph: Any, monkeypatch: An
     step = TransformStamped(child_frame_id='laser')
     step.header.frame_id = 'base_link'
     step.transform.translation.x = 0.3
-    lidar._on_static(tf2.TFMessage(transforms=[step]))
+    lidar.frames.hear_fixed(tf2.TFMessage(transforms=[step]))
     come()
     assert mounts == [pytest.approx((0.3, 0.0, 0.0))]
     # Where nobody tells, it is taken for the centre after a while, and that is said.

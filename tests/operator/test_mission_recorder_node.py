@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
 from nav_msgs.msg import OccupancyGrid
 from PIL import Image as PictureFile
 from rclpy.serialization import deserialize_message
@@ -119,3 +120,35 @@ def test_an_image_a_second_is_kept_where_somebody_looks(graph: Any, tmp_path: Pa
     assert kept[0].header.frame_id == 'camera'
     assert PictureFile.open(io.BytesIO(bytes(kept[0].data))).size == (4, 2)
     assert not [t for t, _, _ in Messages(folder).in_order() if t in ('/seen', '/unseen')]
+
+
+def test_two_types_on_one_name_are_told_with_both_owners(graph: Any, tmp_path: Path) -> None:
+    # The middleware refuses a second type to one participant: the other node is of its own.
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=graph.context.get_domain_id())
+    planner = rclpy.create_node('planner_server', context=context)
+    try:
+        theirs = planner.create_publisher(String, '/follow_path/_action/feedback', STATE_QOS)
+        ours = graph.node.create_publisher(
+            FollowPath.Impl.FeedbackMessage, '/follow_path/_action/feedback', STATE_QOS
+        )
+        theirs.publish(String(data='not ours'))
+        folder = tmp_path / '20260101-000000' / 'recording'
+        recorder = graph.add(MissionRecorder, parameters={'folder': str(folder)})
+
+        def told() -> list[str]:
+            return [each.text for each in recorder.incidents.updates()]
+
+        graph.until(lambda: any('String of /planner_server' in text for text in told()))
+        (text,) = told()
+        assert 'FollowPath_FeedbackMessage of /test' in text
+        # What comes of the known type is recorded still.
+        words = graph.node.create_publisher(String, '/words', STATE_QOS)
+        words.publish(String(data='recorded'))
+        graph.until(words.get_subscription_count)
+        planner.destroy_publisher(theirs)
+        graph.until(lambda: not told())
+        assert ours is not None
+    finally:
+        planner.destroy_node()
+        rclpy.shutdown(context=context)

@@ -83,9 +83,23 @@ def test_another_robot_s_topics_types_frames_and_lidars_reach_the_nodes(tmp_path
     renamed = dict(remappings(file.profile, DRIVING, 'ROBOT'))
     assert renamed['cmd_vel'] == 'wanted'
     assert renamed['cmd_vel_monitored'] == 'base/cmd'
+    assert 'plan' not in renamed
     # With nobody between, the controller speaks to the base itself.
     alone = [name for name in DRIVING if name != 'collision_monitor']
     assert dict(remappings(file.profile, alone, 'ROBOT'))['cmd_vel'] == 'base/cmd'
+
+
+def test_beside_nav2_its_names_are_left_to_it(tmp_path: Path) -> None:
+    path = tmp_path / 'robot.yaml'
+    path.write_text('dock: {navigator: nav2}')
+    file = read_profile(path)
+    renamed = dict(remappings(file.profile, DRIVING, 'ROBOT'))
+    assert renamed['plan'] == 'patrol/plan'
+    # rcl knows no name of an action, but those of its services and topics.
+    parts = {'send_goal', 'cancel_goal', 'get_result', 'feedback', 'status'}
+    for part in parts:
+        name = f'follow_path/_action/{part}'
+        assert renamed[name] == f'patrol/{name}'
 
 
 @pytest.mark.parametrize(

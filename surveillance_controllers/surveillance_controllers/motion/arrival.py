@@ -8,9 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from lidar_navigation.geometry import Points
+from lidar_navigation.geometry import Points, Pose
 from state_machines.ros import GoalRun
 from surveillance_controllers.manual import commands
+from surveillance_controllers.motion.holding import Hold
 
 
 class BaseMotion(Protocol):
@@ -33,6 +34,14 @@ class BaseMotion(Protocol):
     @property
     def map_frame(self) -> str:
         """The name of the map's frame."""
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where the robot is; None: that is not known."""
+
+    @property
+    def hold(self) -> Hold:
+        """Whether the robot is to stand."""
 
 
 class MotionFailedError(Exception):

@@ -1,21 +1,21 @@
-"""Motion for `motion_controller` by Nav2, and docking by Nav2's docking server.
+"""Motion for `motion_controller` by Nav2.
 
 A path becomes a NavigateThroughPoses goal, so that Nav2 goes the way that was planned here, through
 the doors that are open. (Its action FollowPath has the name of this project's own, `follow_path`.)
 A path that only says where to turn (`spin_in_place`) becomes a Spin goal.
-At the end of a way to the station a docking server (opennav_docking) may dock the robot, whoever
-drove it there.
 
-The messages of both come with Nav2, in nav2_msgs (Humble had opennav_docking_msgs); without them
-neither can start, and says so.
+Where the robot is, `map -> odom -> base` on `tf` says, else `amcl_pose`. Where no other program
+tells `amcl_pose` (slam_toolbox, RTAB-Map, Cartographer), this one does, from `tf`: planner, battery
+and page read it.
 """
 
 from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -23,11 +23,12 @@ import numpy as np
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
+from rclpy.clock import Clock, ClockType
 
-from floor_plans.parameters import station_at, stations_in
 from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import (
     Points,
+    Pose,
     angle_between,
     distance_nearest,
     equally_spaced,
@@ -36,20 +37,34 @@ from lidar_navigation.geometry import (
     points_passed,
 )
 from state_machines import Interrupt
-from state_machines.ros import CallError, CallInterruptedError, GoalCaller, GoalRun
+from state_machines.ros import GoalEnd, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
-from surveillance_controllers.motion.arrival import BaseMotion, MotionFailedError, expect_place
+from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.holding import Hold
+from surveillance_controllers.motion.nav2_goals import (
+    DRIVING_SERVERS,
+    GoalCanceller,
+    Nav2Goals,
+    OtherGoals,
+    nav2_actions,
+    reason_of,
+)
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_runtime.conversions import pose_from, pose_message, seconds_of
+from surveillance_runtime.conversions import (
+    pose_estimate,
+    pose_from,
+    pose_message,
+    seconds_of,
+    stamp_from,
+)
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.place_changes import follow_place
 from surveillance_runtime.place_parameters import door_segments, place_positions
 from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.sensing.frames_heard import FramesHeard
 from surveillance_runtime.spin_in_place import bearing_of
 from surveillance_runtime.state_topics import StateSubscription
 
@@ -59,30 +74,57 @@ SPIN_ALLOWANCE = Duration(sec=30)
 """So long a turn on the spot may take."""
 MOST_POSES = 10_000
 """A path that would need more poses is led through poses farther apart."""
+FRESH = 1.5
+"""A pose on `tf` counts for so long, and one on `amcl_pose` at the end of a way, seconds. (AMCL
+tells none until the robot has moved 0.25 m.)"""
+POSE_PERIOD = 0.2
+"""Time between two looks at where `tf` has the robot, seconds."""
+STALLED = 90.0
+"""A robot that has not moved for so long on its way is not brought there, seconds: some server
+never answers, or a costmap does not clear. Nav2's own recoveries are through before."""
+MOVED = 0.25
+"""It has moved when it is this far from where it was, metres."""
 
 
-def nav2_actions(parameter: str, value: str, without: str, *names: str) -> list[Any]:
-    """Return action types of Nav2 by their names.
+@dataclass
+class DriveProgress:
+    """How far one drive is, by Nav2's feedback.
 
-    Args:
-        parameter: Of the node, which asks for them,
-        value: with this value.
-        without: The value that does not need them.
-        names: Of the types.
-
-    Raises:
-        ParameterError: nav2_msgs is not installed.
+    Attributes:
+        position: Where the robot is, shape (3,), metres; None: Nav2 has not said it.
+        recoveries: How often Nav2 had to recover.
+        left: How far it still has to go, metres; None: Nav2 has not said it.
+        anchor: Where it was when it had last moved.
+        moved_at: When that was, seconds.
     """
-    try:
-        from nav2_msgs import action
 
-        return [getattr(action, name) for name in names]
-    except (ImportError, AttributeError):
-        raise ParameterError(
-            f'parameter {parameter}: got {value}, but the Python package nav2_msgs is not '
-            'installed: install ros-jazzy-nav2-msgs and source its workspace, or use '
-            f'{parameter}:={without}'
-        ) from None
+    moved_at: float
+    position: Points | None = None
+    recoveries: int = 0
+    left: float | None = None
+    anchor: Points | None = None
+
+    def take(self, feedback: Any, now: float) -> Points | None:
+        """Take a feedback message; return where the robot is, None where it does not say it."""
+        self.recoveries = int(getattr(feedback, 'number_of_recoveries', 0))
+        left = float(getattr(feedback, 'distance_remaining', math.nan))
+        self.left = left if math.isfinite(left) and left >= 0.0 else self.left
+        point: Points = conversions.array_from_points([feedback.current_pose.pose.position])[0]
+        if not np.isfinite(point).all():
+            return None
+        self.position = point
+        if self.anchor is None or float(np.linalg.norm(point - self.anchor)) >= MOVED:
+            self.anchor, self.moved_at = point, now
+        return point
+
+    def words(self) -> str:
+        """Return what there was on the way, to be added to a reason; empty: nothing."""
+        said = []
+        if self.recoveries:
+            said.append(f'after {self.recoveries} recoveries')
+        if self.left:
+            said.append(f'{self.left:.1f} m before its end')
+        return ''.join(f', {each}' for each in said)
 
 
 class Nav2Motion:
@@ -91,8 +133,8 @@ class Nav2Motion:
     Args:
         node: The motion controller's node.
         knowledge: Map and ontology.
-        recorder: Is told the place that the robot is in, by the topics `amcl_pose` and `map`.
-        settings: How long Nav2 may take to appear and accept a goal.
+        recorder: Is told the place that the robot is in, by its pose and the topic `map`.
+        settings: How long Nav2 may take to accept a goal.
 
     Raises:
         ParameterError: nav2_msgs is not installed.
@@ -110,19 +152,27 @@ class Nav2Motion:
         self._type, self._spin = nav2_actions(
             'navigator', 'nav2', 'own', 'NavigateThroughPoses', 'Spin'
         )
-        self._timeout = settings.peer_timeout
-        self._frames = declared_frames(node, 'map')
-        self._navigator = GoalCaller(node, self._type, 'navigate_through_poses')
-        self._spinner = GoalCaller(node, self._spin, 'spin')
-        self._hold = Hold(node)
+        self._frames = declared_frames(node, 'map', 'odom', 'base')
+        self.hold = Hold(node)
+        wait = settings.peer_timeout
+        name = 'navigate_through_poses'
+        self._navigator = Nav2Goals(node, self.hold, self._type, name, DRIVING_SERVERS, wait)
+        spinning = 'behavior_server', 'velocity_smoother', 'collision_monitor'
+        self._spinner = Nav2Goals(node, self.hold, self._spin, 'spin', spinning, wait)
+        self._others = OtherGoals(node)
+        self._orphans = GoalCanceller(node, 'follow_path')
         self._lock = threading.Lock()
         self._places = PlaceLocator(door_segments(node).values())
-        self._point: Points | None = None
-        self._yaw = math.nan
+        # Of the last pose: where, and when it was heard, steady seconds.
+        self._pose: Pose | None = None
+        self._heard_at = -math.inf
+        self._drive: tuple[DriveProgress, Interrupt, GoalRun] | None = None
         positions = place_positions(node)
         self._places.set_positions(positions)
         knowledge.assume(positions)
         knowledge.follow_places(self._set_positions)
+        self._tf = FramesHeard(node)
+        self._own_poses: Any = None
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(
             node,
@@ -131,84 +181,102 @@ class Nav2Motion:
             self._on_pose,
             stamp=lambda told: seconds_of(told.header.stamp),
         )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(POSE_PERIOD, self._look, clock=steady)
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
         """Send the robot along a path of shape (n, 3).
 
         Returns:
-            Where the robot is then, by `amcl_pose`, else as Nav2 said last, shape (3,).
+            Where the robot is then, shape (3,).
 
         Raises:
             MotionFailedError: It did not get there.
         """
         if (bearing := bearing_of(path.tolist())) is not None:
             return self._turn(bearing, path[0], run)
-        position: Points | None = None
+        progress, stalled = DriveProgress(run.now()), Interrupt()
+
+        def make() -> Any:
+            # A goal that is sent again gets what is left of the way.
+            left = path if progress.position is None else rest_of(path, progress.position)
+            progress.moved_at = run.now()
+            return self._type.Goal(poses=self._poses(left))
 
         def on_feedback(feedback: Any) -> None:
-            nonlocal position
-            point = conversions.array_from_points([feedback.current_pose.pose.position])[0]
-            if np.isfinite(point).all():
-                position = point
+            if (point := progress.take(feedback, run.now())) is not None:
                 report(point)
 
-        while True:
-            self._hold.await_end(run.interrupt)
-            # A robot that is to stand has its goal cancelled, and gets what is left of it again.
-            either = Interrupt()
-            forget = run.interrupt.subscribe(either.set), self._hold.begun.subscribe(either.set)
-            try:
-                end = self._navigator.run(
-                    self._type.Goal(poses=self._poses(path)),
-                    accept_timeout=self._timeout,
-                    interrupt=either,
-                    on_feedback=on_feedback,
-                )
-                break
-            except CallInterruptedError:
-                if run.interrupt.is_set() or not either.is_set():
-                    # It was cancelled, which is no failure.
-                    return path[0] if position is None else position
-                if position is not None:
-                    path = rest_of(path, position)
-            except CallError as error:
-                raise MotionFailedError(str(error), position) from error
-            finally:
-                for each in forget:
-                    each()
+        self._drive = progress, stalled, run
+        try:
+            end = self._navigator.send(make, run, on_feedback, also=stalled)
+        except MotionFailedError as error:
+            raise MotionFailedError(f'{error}{progress.words()}', progress.position) from error
+        finally:
+            self._drive = None
+        if end is None:
+            if stalled.is_set() and not run.interrupt.is_set():
+                self._orphans.cancel(run.interrupt)
+                why = f'Nav2 has not moved the robot for {STALLED:g} s{progress.words()}'
+                raise MotionFailedError(why, self._position(progress))
+            # It was cancelled, which is no failure.
+            return path[0] if progress.position is None else progress.position
         if end.status != 'succeeded':
-            raise MotionFailedError(f'Nav2 {end.status} the goal{reason_of(end.result)}', position)
-        if self._point is not None:
-            return self._point
-        # Nobody tells amcl_pose.
-        position = path[-1] if position is None else position
+            self._give_way(end, run)
+            why = f'Nav2 {end.status} the goal{reason_of(end.result)}{progress.words()}'
+            raise MotionFailedError(why, self._position(progress))
+        position = self._position(progress)
+        if position is None:
+            position = path[-1]
         self._tell(position)
         return position
 
+    def _give_way(self, end: GoalEnd, run: GoalRun) -> None:
+        """Wait while another program has Nav2 drive, which took the place of our goal."""
+        if getattr(end.result, 'error_code', 0) or not run.sleep(0.5):
+            return
+        cause = 'robot', 'goal'
+        while name := self._others.running():
+            self._node.incidents.begin(
+                cause,
+                f'another program, RViz perhaps, has a goal on {name}: the patrol waits for its '
+                'end',
+            )
+            if not run.sleep(1.0):
+                break
+        self._node.incidents.end(cause, "the other program's goal has ended")
+
+    def _position(self, progress: DriveProgress) -> Points | None:
+        """Return where the robot is at the end of a drive, shape (3,); None: nobody says.
+
+        What was heard long ago is not believed: AMCL tells no pose until the robot has moved.
+        """
+        if time.monotonic() - self._heard_at <= FRESH and self._pose is not None:
+            return point_of(self._pose)
+        if progress.position is not None:
+            return progress.position
+        return None if self._pose is None else point_of(self._pose)
+
     def _turn(self, bearing: float, at: Points, run: GoalRun) -> Points:
         """Turn on the spot, which Nav2 does by an angle; return where the robot is."""
-        self._hold.await_end(run.interrupt)
-        if not math.isfinite(self._yaw):
-            raise MotionFailedError('amcl_pose: nobody tells where the robot points', at)
-        goal = self._spin.Goal(
-            target_yaw=angle_between(self._yaw, bearing), time_allowance=SPIN_ALLOWANCE
-        )
-        either = Interrupt()
-        forget = run.interrupt.subscribe(either.set), self._hold.begun.subscribe(either.set)
-        try:
-            end = self._spinner.run(goal, accept_timeout=self._timeout, interrupt=either)
-        except CallInterruptedError:
-            if run.interrupt.is_set():
-                return at
-            raise MotionFailedError('the robot is to stand', at) from None
-        except CallError as error:
-            raise MotionFailedError(str(error), at) from error
-        finally:
-            for each in forget:
-                each()
-        if end.status != 'succeeded':
+        if self._pose is None:
+            raise MotionFailedError(
+                'nobody tells where the robot points: expected amcl_pose, or '
+                f'{self._frames.map} -> {self._frames.odom} -> {self._frames.base} on tf',
+                at,
+            )
+
+        def make() -> Any:
+            pose = self._pose
+            assert pose is not None
+            return self._spin.Goal(
+                target_yaw=angle_between(pose[2], bearing), time_allowance=SPIN_ALLOWANCE
+            )
+
+        end = self._spinner.send(make, run)
+        if end is not None and end.status != 'succeeded':
             raise MotionFailedError(f'Nav2 {end.status} the turn{reason_of(end.result)}', at)
-        return at if self._point is None else self._point
+        return at if end is None else point_of(self._pose)
 
     def _poses(self, path: Points) -> list[PoseStamped]:
         """Return the poses behind the start, each facing along the path."""
@@ -225,28 +293,67 @@ class Nav2Motion:
             poses.append(pose)
         return poses
 
+    def _look(self) -> None:
+        """Take where `tf` has the robot; end a drive that stands."""
+        found = self._tf.pose(self._frames.base, self._frames.map, FRESH)
+        if found is not None:
+            pose, stamp = found
+            self._take(pose)
+            self._publish(pose, stamp)
+        if self._drive is not None:
+            progress, stalled, run = self._drive
+            if self.hold.active:
+                progress.moved_at = run.now()
+            elif run.now() - progress.moved_at > STALLED:
+                stalled.set()
+
+    def _publish(self, pose: Pose, stamp: float) -> None:
+        """Tell `amcl_pose` where no other program does."""
+        own = 0 if self._own_poses is None else 1
+        if self._node.count_publishers('amcl_pose') > own:
+            if self._own_poses is not None:
+                self._node.destroy_publisher(self._own_poses)
+                self._own_poses = None
+            return
+        if self._own_poses is None:
+            self._own_poses = self._node.create_publisher(
+                PoseWithCovarianceStamped, 'amcl_pose', STATE_QOS
+            )
+        message = PoseWithCovarianceStamped(pose=pose_estimate(pose, 0.1, 0.05))
+        message.header.frame_id = self.map_frame
+        message.header.stamp = stamp_from(round(1e9 * stamp))
+        self._own_poses.publish(message)
+
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        if self._own_poses is not None:
+            return
         with refusing(self._node, 'amcl_pose'):
-            pose = pose_from(message.pose.pose)
-            self._point, self._yaw = point_of(pose), pose[2]
-            self._tell(self._point)
+            self._take(pose_from(message.pose.pose))
+
+    def _take(self, pose: Pose) -> None:
+        self._pose, self._heard_at = pose, time.monotonic()
+        self._tell(point_of(pose))
 
     def _on_map(self, message: OccupancyGrid) -> None:
         with refusing(self._node, 'map'):
             grid = conversions.grid_from(message)
             with self._lock:
                 self._places.set_map(grid)
-            self._tell(self._point)
+            self._tell_pose()
 
     def _set_positions(self, positions: Mapping[str, Points]) -> None:
         with self._lock:
             self._places.set_positions(positions)
-        self._tell(self._point)
+        self._tell_pose()
 
-    def _tell(self, point: Points | None) -> None:
+    def _tell_pose(self) -> None:
+        if self._pose is not None:
+            self._tell(point_of(self._pose))
+
+    def _tell(self, point: Points) -> None:
         """Tell the place that the robot is in; where it is in none, that stays as it was."""
         with self._lock:
-            place = None if point is None else self._places.place_at(point)
+            place = self._places.place_at(point)
         if place is not None:
             self._recorder.tell(place)
 
@@ -265,6 +372,11 @@ class Nav2Motion:
         """The name of the map's frame."""
         return self._frames.map
 
+    @property
+    def pose(self) -> Pose | None:
+        """Where the robot is; None: nobody has said it."""
+        return self._pose
+
     def look_around(self, _run: GoalRun) -> None:
         """Nothing: Nav2's own behaviours turn the robot where that is wanted."""
 
@@ -273,113 +385,3 @@ def rest_of(path: Points, position: Points) -> Points:
     """Return what is left of a path from where the robot is, shape (n, 3), n of at least 2."""
     passed = points_passed(path, distance_nearest(path, position))
     return np.vstack([position, path[min(passed, len(path) - 1) :]])
-
-
-class DockingMotion:
-    """Moves as another motion does, and docks where a way ends at a station.
-
-    Args:
-        node: The motion controller's node.
-        inner: Drives the robot.
-        settings: The stations, how near to one a way must end, the dock's type, and how long the
-            server may take to appear and accept a goal.
-
-    Raises:
-        ParameterError: nav2_msgs is not installed.
-    """
-
-    def __init__(self, node: PatrolNode, inner: BaseMotion, settings: MotionSettings) -> None:
-        self._node = node
-        self._inner = inner
-        self._settings = settings
-        actions = nav2_actions('docking', 'opennav', 'none', 'DockRobot', 'UndockRobot')
-        self._dock, self._undock = actions
-        self._docker = GoalCaller(node, self._dock, 'dock_robot')
-        self._undocker = GoalCaller(node, self._undock, 'undock_robot')
-        self._docked = False
-        follow_place(node, self._take_place)
-
-    def _take_place(self, described: Mapping[str, Any]) -> None:
-        """Take the stations of a place that was changed."""
-        self._settings = replace(self._settings, stations=stations_in(described))
-
-    def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:
-        """Undocks where that is needed, drives, and docks where the way ends at a station.
-
-        Raises:
-            MotionFailedError: One of the three failed.
-        """
-        if self._docked:
-            self._docked = False
-            goal = self._undock.Goal(dock_type=self._settings.dock_type)
-            self._carry_out(self._undocker, goal, 'undocking', path[0], run)
-        end = self._inner.follow(path, run, report)
-        station = station_at((end[0], end[1]), self._settings.stations, self._settings.dock_reach)
-        if station is None or run.interrupt.is_set():
-            return end
-        pose = PoseStamped()
-        pose.header.frame_id = self.map_frame
-        pose.header.stamp = self._node.get_clock().now().to_msg()
-        pose.pose = pose_message(station.pose)
-        goal = self._dock.Goal(
-            use_dock_id=bool(station.dock),
-            dock_id=station.dock,
-            dock_pose=pose,
-            dock_type=self._settings.dock_type,
-            navigate_to_staging_pose=False,
-        )
-        self._carry_out(self._docker, goal, 'docking', end, run)
-        self._docked = True
-        return end
-
-    def place_reached(self, goal: Points, end: Points) -> str:
-        """As the motion that drives."""
-        return self._inner.place_reached(goal, end)
-
-    @property
-    def map_frame(self) -> str:
-        """As the motion that drives."""
-        return self._inner.map_frame
-
-    def look_around(self, run: GoalRun) -> None:
-        """As the motion that drives; a docked robot stays as it is."""
-        if not self._docked:
-            self._inner.look_around(run)
-
-    def _carry_out(
-        self, caller: GoalCaller, goal: Any, what: str, at: Points, run: GoalRun
-    ) -> None:
-        try:
-            end = caller.run(
-                goal, accept_timeout=self._settings.peer_timeout, interrupt=run.interrupt
-            )
-        except CallError as error:
-            raise MotionFailedError(f'{what}: {error}', at) from error
-        if end.status != 'succeeded' or not end.result.success:
-            why = reason_of(end.result)
-            raise MotionFailedError(f'{what}: the docking server {end.status} the goal{why}', at)
-
-
-def reason_of(result: Any) -> str:
-    """Return what Nav2 says of a goal that it did not reach, in brackets; empty: nothing."""
-    code = getattr(result, 'error_code', 0)
-    text = ' '.join(str(getattr(result, 'error_msg', '')).split())
-    name = _error_name(result, code) if code else ''
-    said = [f'error code {code}{name and " " + name}'] * bool(code) + [text] * bool(text)
-    return f' ({", ".join(said)})' if said else ''
-
-
-def _error_name(result: Any, code: int) -> str:
-    """Return the constant of an error code; empty: none has it.
-
-    A navigator hands on the codes of its planner and controller, too, which stand in the results
-    of their own actions; each action of Nav2 numbers its errors in a range of its own.
-    """
-    from nav2_msgs import action
-
-    kinds = [getattr(kind, 'Result', None) for _, kind in sorted(vars(action).items())]
-    for kind in (type(result), *kinds):
-        for name in dir(kind):
-            if name.isupper() and '__' not in name and getattr(kind, name) == code:
-                return name
-    return ''

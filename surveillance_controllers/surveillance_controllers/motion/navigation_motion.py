@@ -104,7 +104,7 @@ class NavigationMotion:
             robot,
             settings.peer_timeout,
             self._settings.sensor_timeout,
-            lambda: self._hold.active,
+            lambda: self.hold.active,
         )
         positions = place_positions(node)
         self._set_positions(positions)
@@ -113,10 +113,10 @@ class NavigationMotion:
         knowledge.follow_places(self._set_positions)
         self._knowledge = knowledge
         follow_place(node, self._take_place)
-        self._hold = Hold(node, self._on_hold)
+        self.hold = Hold(node, self._on_hold)
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(node, DoorStates, 'door_states', self._on_doors, owner='simulator')
-        self._odometry = OdometryReader(node, self._on_odometry)
+        self._odometry = OdometryReader(node, self._on_odometry, self._frames)
         self._reports = PoseReports(node, self._navigator, self._frames, self._odometry.stream)
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
@@ -178,6 +178,11 @@ class NavigationMotion:
         return self._frames.map
 
     @property
+    def pose(self) -> Pose | None:
+        """Where the robot is; None: it does not know."""
+        return self._navigator.pose if self._navigator.is_sure else None
+
+    @property
     def _place(self) -> str | None:
         """The place the robot is in; None while that is not known."""
         return self._navigator.place if self._navigator.is_sure else None
@@ -207,8 +212,8 @@ class NavigationMotion:
 
     def _on_hold(self) -> None:
         with self._goals.lock:
-            self._navigator.stands = self._hold.active
-            if self._hold.active and self._navigator.task is not None:
+            self._navigator.stands = self.hold.active
+            if self.hold.active and self._navigator.task is not None:
                 # At once: the next scan may be a tenth of a second away.
                 self._base.command(Velocity())
 

@@ -7,6 +7,7 @@ file `robot.yaml`, `use` says what it means to the nodes of a run (parameters an
 
 from surveillance_runtime.profile.node_configuration import (
     check_behaviour,
+    out_of_nav2s_way,
     profile_layer,
     remappings,
     unmonitored_entries,
@@ -26,6 +27,7 @@ __all__ = [
     'RobotProfile',
     'check_behaviour',
     'find_profile',
+    'out_of_nav2s_way',
     'profile_layer',
     'profile_names',
     'read_profile',

@@ -13,6 +13,9 @@ from surveillance_runtime.profile.record import RobotProfile
 
 MONITOR = 'collision_monitor'
 MODEL_TOPIC = 'battery_state'
+BESIDE_NAV2 = 'patrol'
+"""Where Nav2 drives, the action `follow_path` and the topic `plan` are in this namespace below the
+robot's own: Nav2's controller and planner have those names."""
 DRIVER_TOPIC = 'robot_battery_state'
 """What `battery_controller` calls the topic of a driver of the battery."""
 
@@ -53,6 +56,7 @@ _PARAMETERS = {
     'dock.navigator': ('motion_controller:navigator',),
     'dock.docking': ('motion_controller:docking',),
     'dock.dock_type': ('motion_controller:dock_type',),
+    'dock.staging': ('motion_controller:dock_staging',),
     'dock.reach': ('battery_controller:dock_reach', 'motion_controller:dock_reach'),
 }
 """Parameters that a value of the profile is for, `NODE:NAME`, or NAME of every node that has it.
@@ -130,11 +134,23 @@ def remappings(profile: RobotProfile, nodes: Collection[str], mode: str) -> list
         'joint_states': topics.joint_states,
         'arm/joint_trajectory': topics.arm,
     }
+    if profile.dock.navigator == 'nav2':
+        pairs |= out_of_nav2s_way()
     if len(topics.scans) == 1:
         pairs['scan'] = topics.scans[0]
     if mode == 'ROBOT' and profile.battery.source == 'topic':
         pairs[MODEL_TOPIC] = pairs[DRIVER_TOPIC] = topics.battery
     return [(old, new) for old, new in pairs.items() if new and old != new]
+
+
+def out_of_nav2s_way() -> dict[str, str]:
+    """Return what this project's names become that Nav2 has, too, with other types.
+
+    rcl renames the services and topics of an action, and not the action (Jazzy).
+    """
+    parts = ('send_goal', 'cancel_goal', 'get_result', 'feedback', 'status')
+    names = [*(f'follow_path/_action/{part}' for part in parts), 'plan']
+    return {name: f'{BESIDE_NAV2}/{name}' for name in names}
 
 
 def parameter_values(profile: RobotProfile) -> dict[str, Any]:

@@ -230,6 +230,13 @@ class Docking:
         'none', 'What docks it where a way ends at the station.', choices=('none', 'opennav')
     )
     dock_type: str = parameter('', "The dock's type, as the docking server knows it.")
+    staging: float = parameter(
+        0.0,
+        'How far before its dock the robot is brought, m; 0: the docking server brings it to its '
+        'staging pose, by Nav2 (0.7 with navigator: own).',
+        0.0,
+        5.0,
+    )
     reach: float = parameter(0.5, 'It is at the station within this distance of it, m.', 0.0, 100.0)
 
 

@@ -3,19 +3,36 @@ node's clock, and why it is of no use."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
+from typing import Any
 
 from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
+from rclpy.subscription import Subscription
 
 from lidar_navigation.geometry import Pose
-from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
+from surveillance_runtime.conversions import (
+    pose_of_serialized,
+    seconds_of,
+    stamp_of_serialized,
+)
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.check_up import BASE_FRAMES
+from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing import conversions
 from surveillance_runtime.stamp_offset import StampOffset
 from surveillance_runtime.state_topics import StateSubscription
 
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
+
+BY_TF_AFTER = 2.0
+"""Odometry that nobody publishes as a topic for so long is looked for on `tf`, seconds."""
 REPEATED = 'the same message comes again and again'
 
 
@@ -103,20 +120,27 @@ class SensorStream:
 
 
 class OdometryReader:
-    """Reads `odom`.
+    """Reads `odom`; where nobody publishes that, the odometry's frame on `tf`.
 
     Args:
         node: The node that reads.
         take: Called with each reading, and when it was made, seconds of the node's clock.
+        frames: The names of the frames on `tf`; None: it is not looked at.
 
     Attributes:
         stream: What comes.
     """
 
-    def __init__(self, node: PatrolNode, take: Callable[[Pose, float], object]) -> None:
+    def __init__(
+        self,
+        node: PatrolNode,
+        take: Callable[[Pose, float], object],
+        frames: Frames | None = None,
+    ) -> None:
         self.stream = SensorStream(node, 'odom')
         self._node = node
         self._take = take
+        self._by_tf: Subscription | None = None
         StateSubscription(
             node,
             Odometry,
@@ -127,6 +151,11 @@ class OdometryReader:
             qos=SENSOR_QOS,
             owner='simulator',
         )
+        if frames is not None and TFMessage is not None:
+            self._odom = frames.odom.removeprefix('/')
+            self._bases = {frames.base.removeprefix('/'), *filter(None, BASE_FRAMES)}
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            node.create_timer(BY_TF_AFTER, self._look_for_topic, clock=steady)
 
     def _on_odometry(self, serialized: bytes) -> None:
         with conversions.refusing(self._node, 'odom'):
@@ -134,3 +163,25 @@ class OdometryReader:
             if measured is not None:
                 self._take(pose_of_serialized(serialized, texts=1), measured)
                 self.stream.hear()
+
+    def _look_for_topic(self) -> None:
+        """Hear `tf` while nobody publishes the topic; it costs much where all robots share it."""
+        if self._node.count_publishers('odom'):
+            if self._by_tf is not None:
+                self._node.destroy_subscription(self._by_tf)
+                self._by_tf = None
+        elif self._by_tf is None:
+            self._by_tf = self._node.create_subscription(TFMessage, 'tf', self._on_transforms, 100)
+
+    def _on_transforms(self, message: Any) -> None:
+        for each in message.transforms:
+            names = each.header.frame_id.removeprefix('/'), each.child_frame_id.removeprefix('/')
+            if names[0] != self._odom or names[1] not in self._bases:
+                continue
+            with conversions.refusing(self._node, 'tf: odometry'):
+                matrix = conversions.matrix_from(each.transform)
+                measured = self.stream.come(seconds_of(each.header.stamp), matrix.tobytes())
+                if measured is not None:
+                    x, y = matrix[:2, 3].tolist()
+                    self._take((x, y, math.atan2(matrix[1, 0], matrix[0, 0])), measured)
+                    self.stream.hear()

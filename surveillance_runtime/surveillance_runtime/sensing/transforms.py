@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import TransformStamped
 from numpy.typing import NDArray
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan
 
 from lidar_navigation.geometry import Mount, Pose, Scan, composed, relative
@@ -26,6 +25,8 @@ from surveillance_runtime.profile.parameters import LidarSettings
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing import conversions
+from surveillance_runtime.sensing.frame_tree import plain
+from surveillance_runtime.sensing.frames_heard import FramesHeard
 from surveillance_runtime.sensing.sensors import SensorStream
 from surveillance_runtime.state_topics import StateSubscription
 
@@ -51,6 +52,7 @@ class ScanReader:
     Attributes:
         settings: Which lidars there are.
         streams: What comes on the topic of each.
+        frames: The fixed frames of the robot.
 
     Raises:
         ParameterError: A parameter of the lidars is of the wrong type.
@@ -59,23 +61,15 @@ class ScanReader:
     def __init__(self, node: PatrolNode, radius: float, base: str = BASE_FRAMES[0]) -> None:
         self._node = node
         self._radius = radius
-        self._base = _plain(base)
+        self._base = plain(base)
         self.settings = node.declare_fields(LidarSettings())
         rows = np.array(self.settings.mounts, dtype=float).reshape(-1, 4).tolist()
         self._given = [Mount((x, y, yaw), math.cos(roll) < 0.0) for x, y, yaw, roll in rows]
-        self._parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._mounts: dict[str, Mount] = {}
         self._told: set[str] = set()
         self.streams = {topic: SensorStream(node, topic) for topic in self.settings.scans}
         self._waits_until: dict[str, float] = {}
-        if TFMessage is not None:
-            latched = QoSProfile(
-                depth=100,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-            # All robots of a domain may share it.
-            node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
+        self.frames = FramesHeard(node, moving=False, news=self._mounts.clear)
 
     def subscribe(self, heard: Callable[[str, Scan, LaserScan], None]) -> None:
         """Hand over each scan: the name of its topic, the scan, and its message, whose stamp is the
@@ -130,15 +124,10 @@ class ScanReader:
 
     def _matrix_of(self, frame: str) -> NDArray[np.float64] | None:
         """Return where a frame is on the robot, shape (4, 4); None where nobody has said it."""
-        matrix = np.eye(4)
-        at, passed = _plain(frame), 0
-        while at != self._base and at.rpartition('/')[2] not in BASE_FRAMES:
-            if at not in self._parents or passed > len(self._parents):
-                return None
-            at, step = self._parents[at]
-            matrix = step @ matrix
-            passed += 1
-        return matrix
+        found = self.frames.tree.matrix(
+            frame, lambda at: at == self._base or at.rpartition('/')[2] in BASE_FRAMES
+        )
+        return None if found is None else found[0]
 
     def _looked_up(self, frame: str) -> Mount:
         matrix = self._matrix_of(frame)
@@ -162,13 +151,6 @@ class ScanReader:
         if text not in self._told:
             self._told.add(text)
             self._node.get_logger().warn(text)
-
-    def _on_static(self, message: Any) -> None:
-        for each in message.transforms:
-            with conversions.refusing(self._node, f'tf_static: {each.child_frame_id}'):
-                matrix = conversions.matrix_from(each.transform)
-                self._parents[_plain(each.child_frame_id)] = _plain(each.header.frame_id), matrix
-        self._mounts.clear()
 
 
 class MapFrame:
@@ -224,15 +206,10 @@ class MapFrameReader:
             node.create_subscription(TFMessage, 'tf', self._on_transforms, 100)
 
     def _on_transforms(self, message: Any) -> None:
-        wanted = _plain(self._frames.map), _plain(self._frames.odom)
+        wanted = plain(self._frames.map), plain(self._frames.odom)
         for each in message.transforms:
-            if (_plain(each.header.frame_id), _plain(each.child_frame_id)) == wanted:
+            if (plain(each.header.frame_id), plain(each.child_frame_id)) == wanted:
                 with conversions.refusing(self._node, 'tf: map -> odom'):
                     matrix = conversions.matrix_from(each.transform)
                     x, y = matrix[:2, 3].tolist()
                     self._take((x, y, math.atan2(matrix[1, 0], matrix[0, 0])))
-
-
-def _plain(frame: str) -> str:
-    """Return a frame's name without the slash that older drivers begin it with, as tf2 does."""
-    return frame.removeprefix('/')
