@@ -1,8 +1,9 @@
-"""What goes wrong with a whole machine, for one group of processes only.
+"""What goes wrong with a machine, for one group of processes only, and with one thread of one.
 
 A small disk that fills up is a tmpfs in this process's own mount namespace; it ends with the
-process. A clock that steps is the real-time clock of the processes that are started with
-`SteppedClock.environ`: a library in front of libc's adds an offset, the machine's own clock stays.
+process. A thread that stands is held by a tracer (ptrace(2)). A clock that steps is the real-time
+clock of the processes that are started with `SteppedClock.environ`: a library in front of libc's
+adds an offset, the machine's own clock stays.
 """
 
 from __future__ import annotations
@@ -159,3 +160,51 @@ class SteppedClock:
         """Set the clock forward, or back."""
         self.seconds += seconds
         self._offset[:] = struct.pack('l', self.seconds)
+
+
+_TRACER = r"""
+import ctypes, os, sys
+trace = ctypes.CDLL(None, use_errno=True).ptrace
+trace.argtypes, trace.restype = [ctypes.c_long] * 4, ctypes.c_long
+threads = [int(each) for each in sys.argv[1:]]
+for thread in threads:
+    for request in (0x4206, 0x4207):  # PTRACE_SEIZE, PTRACE_INTERRUPT
+        if trace(request, thread, 0, 0):
+            sys.exit(os.strerror(ctypes.get_errno()))
+for thread in threads:
+    os.waitpid(thread, 0x40000000)  # __WALL
+print('stands', flush=True)
+for thread in threads:  # until it is killed: who traces it has to take note of that
+    while not (os.WIFEXITED(end := os.waitpid(thread, 0x40000000)[1]) or os.WIFSIGNALED(end)):
+        pass
+"""
+
+
+class FrozenThreads:
+    """Threads of another process that stand until the process is killed, or this is closed.
+
+    Args:
+        pid: The process.
+        name: What their names begin with, as the kernel knows them.
+
+    Raises:
+        OSError: There is none, or they may not be traced.
+    """
+
+    def __init__(self, pid: int, name: str) -> None:
+        threads = []
+        for thread in os.listdir(f'/proc/{pid}/task'):
+            with open(f'/proc/{pid}/task/{thread}/comm', encoding='utf-8') as file:
+                if file.read().startswith(name):
+                    threads.append(thread)
+        words = [sys.executable, '-c', _TRACER, *threads]
+        self._tracer = subprocess.Popen(words, stdout=subprocess.PIPE)
+        assert self._tracer.stdout is not None
+        if not threads or not self._tracer.stdout.readline():
+            self.close()
+            raise OSError(f'process {pid}: no thread {name}..., or it may not be traced')
+
+    def close(self) -> None:
+        """Let them go on."""
+        self._tracer.kill()
+        self._tracer.wait()

@@ -19,6 +19,7 @@ from functools import partial
 
 from launcher.log_merge import MergedLog
 from launcher.process_watch import IDLE_AFTER, Activity, Heartbeats, look_at
+from launcher.receive_queues import ReceiveQueues
 from launcher.restarts import PAUSES, Restarts
 from launcher.service import notify
 from surveillance_runtime.launch_protocol import (
@@ -151,6 +152,8 @@ class Supervisor:
         self._on_restart = on_restart
         self._on_tick = on_tick
         self._look_at = 0.0
+        domain = next((each.environ.get('ROS_DOMAIN_ID', '') for each in programs), '')
+        self._queues = ReceiveQueues(int(domain) if domain.isdecimal() else 0)
         self._selector = selectors.DefaultSelector()
         self._stopping_since: float | None = None
         self._stop_at_once = False
@@ -377,14 +380,22 @@ class Supervisor:
         notify('WATCHDOG=1')
         late = now - self._look_at
         self._look_at = now + LOOK_PERIOD
+        if late > LOOK_PERIOD:  # the launcher itself did not run: the machine slept
+            self._queues.excuse()
+        come_up = [
+            child.process.pid
+            for child in self.children.values()
+            if child.process is not None and child.heartbeats is not None and child.heartbeats.begun
+        ]
+        deaf = self._queues.look(come_up, now)
         for child in self.children.values():
             if child.process is None or child.heartbeats is None or child.killed:
                 continue
-            if late > LOOK_PERIOD:  # the launcher itself did not run: the machine slept
+            if late > LOOK_PERIOD:
                 child.heartbeats.excuse(now)
                 continue
             look = look_at(child.process.pid)
-            problem = child.heartbeats.problem(now, look)
+            problem = child.heartbeats.problem(now, look) or deaf.get(child.process.pid, '')
             can_tell = bool(problem) and look is not None and look.state != 'T'
             most = child.program.memory
             if look is not None and most and look.memory > most:

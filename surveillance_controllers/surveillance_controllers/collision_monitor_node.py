@@ -23,12 +23,13 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
@@ -65,8 +66,8 @@ from surveillance_runtime.state_topics import (
     StateSubscription,
     publishers_of,
 )
+from surveillance_runtime.stop_keeper import StopKeeper
 from surveillance_runtime.stop_request import OWN, TOPIC, StopFile, StopRequest, own_file
-from surveillance_runtime.waiting import AwaitedWork
 
 STOP_CAUSE = ('person', 'stop')
 MONITORED = 'cmd_vel_monitored'
@@ -177,10 +178,9 @@ class CollisionMonitor(PatrolNode):
         self._seen: dict[str, Scan] = {}
         self._lidars: dict[str, list[str]] = {}
         self._is_held_back = False
-        self._file = StopFile(self._kept_in(self._settings.state_file))
-        self._disk = AwaitedWork(self, 1)
-        self.stopping.subscribe(self._disk.stop)
-        self._stop = self._file.read()
+        files = [StopFile(each) for each in self._kept_in(self._settings.state_file)]
+        self._keeper = StopKeeper(self, *files)
+        self._stop = next(filter(None, (each.read() for each in files)), None)
         self._stopped_topic = OwnedTopic(self, Bool, STOPPED)
         self._base = CommandPublisher(
             self,
@@ -201,18 +201,23 @@ class CollisionMonitor(PatrolNode):
             raw=True,
             stamp=stamp_of_serialized,
         )
-        self.create_service(SetBool, 'stop', self._on_stop)
-        self.create_subscription(StopRequestMessage, TOPIC, self._on_request, 10)
+        # While one waits for the disk, commands, scans and the next press are handled.
+        aside = ReentrantCallbackGroup()
+        self.create_service(SetBool, 'stop', self._on_stop, callback_group=aside)
+        self.create_subscription(
+            StopRequestMessage, TOPIC, self._on_request, 10, callback_group=aside
+        )
         self._tell_stop()
         self.create_timer(UNGUARDED_AFTER, self._look_for_base)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK_PERIOD, self._look_for_others, clock=steady)
 
-    def _kept_in(self, name: str) -> Path | None:
+    def _kept_in(self, name: str) -> list[Path | None]:
+        """Return where a stop is kept, and where whoever drives has kept it (`Hold`)."""
+        own = own_file(self.context.get_domain_id(), self.get_namespace(), os.environ)
         if name == OWN:
-            domain = self.context.get_domain_id()
-            return own_file(domain, self.get_namespace(), os.environ)
-        return Path(name).expanduser() if name else None
+            return [own]
+        return [Path(name).expanduser(), own] if name else [None]
 
     def _on_command(self, message: Twist) -> None:
         speed, turn = message.linear.x, message.angular.z
@@ -281,12 +286,11 @@ class CollisionMonitor(PatrolNode):
         elif self._stop is None:
             response.message = 'it is not stopped'
         else:
-            problem = await self._disk.run(self._file.forget)
             self._stop = None
             self._tell_stop()
             response.message = 'the robot may move again'
             self.get_logger().warn(f'{response.message}: a person wants it so')
-            if problem:
+            if problem := await self._keeper.forget():
                 response.message += f'; the next start finds it stopped: {problem}'
         return response
 
@@ -295,10 +299,7 @@ class CollisionMonitor(PatrolNode):
         self._stop = request
         self._base.command(Velocity())
         self._tell_stop()
-        problem = str(await self._disk.run(partial(self._file.keep, request)))
-        if problem:
-            self.get_logger().error(f'the stop cannot be kept over a restart: {problem}')
-        return problem
+        return await self._keeper.keep(request)
 
     def _tell_stop(self) -> None:
         self._stopped_topic.publish(Bool(data=self._stop is not None))

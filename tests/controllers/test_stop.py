@@ -22,6 +22,7 @@ from surveillance_operator.stop_button import StopButton
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.state_topics import OwnedTopic
+from surveillance_runtime.stop_request import StopFile, StopRequest
 
 from .test_navigation_motion import World, world  # noqa: F401 - a fixture
 
@@ -128,6 +129,66 @@ def test_a_stop_while_the_monitor_is_dead_is_obeyed_by_who_drives_and_by_the_nex
     assert hold.active
     assert button.press(False) == 'the robot may move again'
     graph.until(lambda: not hold.active)
+
+
+def test_a_stop_that_who_drives_alone_has_confirmed_outlives_its_death_too(graph: Any) -> None:
+    drive = graph.add(PatrolNode, name='motion_controller')
+    Hold(drive)
+    console = graph.add(PatrolNode, name='console')
+    button = StopButton(console, owner='the guard')
+    assert button.press(True).startswith('the robot stands: collision_monitor has not confirmed')
+    graph.drop(drive)
+    graph.drop(console)
+    monitor = graph.add(CollisionMonitor)
+    assert 'stopped by the guard at ' in open_text(monitor, ('person', 'stop'))
+    assert press(graph, False) == 'the robot may move again'
+    graph.remove(monitor)
+    assert ('person', 'stop') not in graph.add(CollisionMonitor).incidents.open()
+
+
+def test_what_who_drives_has_kept_is_found_by_a_monitor_with_a_file_of_its_own(
+    graph: Any, tmp_path: Path
+) -> None:
+    drive = graph.add(PatrolNode, name='motion_controller')
+    Hold(drive)
+    StopButton(graph.add(PatrolNode, name='console')).press(True)
+    kept = {'state_file': str(tmp_path / 'monitor.json')}
+    graph.drop(drive)
+    monitor = graph.add(CollisionMonitor, kept)
+    assert 'by console' in open_text(monitor, ('person', 'stop'))
+    press(graph, False)
+    graph.remove(monitor)
+    assert ('person', 'stop') not in graph.add(CollisionMonitor, kept).incidents.open()
+
+
+def test_while_the_disk_hangs_the_monitor_goes_on(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked, answers, goes_on = threading.Event(), threading.Event(), StopFile.keep
+
+    def hang(file: StopFile, request: StopRequest) -> str:
+        asked.set()
+        answers.wait()
+        return goes_on(file, request)
+
+    monkeypatch.setattr(StopFile, 'keep', hang)
+    file = tmp_path / 'monitor.json'
+    graph.add(CollisionMonitor, {'state_file': str(file)})
+    joystick = Joystick(graph)
+    graph.until(lambda: joystick.speed() == 0.5)
+    try:
+        said = press(graph, True)
+        assert said.startswith('the robot is stopped, but not over a restart of collision_monitor')
+        assert 'the disk has not answered' in said
+        assert asked.is_set()
+        graph.until(lambda: joystick.speed() == 0.0)
+        assert 'the disk has not answered' in press(graph, False)
+        graph.until(lambda: joystick.speed() == 0.5)
+        press(graph, True)
+        graph.until(lambda: joystick.speed() == 0.0)
+    finally:
+        answers.set()
+    graph.until(file.exists)
 
 
 def test_a_stop_that_nobody_hears_is_asked_again(graph: Any) -> None:

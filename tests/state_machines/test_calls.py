@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import gc
 import itertools
+import signal
+import subprocess
+import sys
 import threading
 import time
 from types import SimpleNamespace
@@ -468,6 +471,38 @@ def test_server_that_takes_the_place_of_one_that_was_killed_is_noticed(graph):
     with pytest.raises(UnavailableError, match=r'another server took|does not know the goal'):
         end()
     assert server.cancelled.wait(60.0), 'if it lives after all, the goal must not run on unseen'
+
+
+SERVER = """
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from surveillance_interfaces.action import FollowPath
+from state_machines.ros import GoalServer
+
+rclpy.init()
+node = Node('server')
+GoalServer(node, FollowPath, 'follow_path', lambda _goal, run: run.interrupt.wait())
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+executor.spin()
+"""
+
+
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGSTOP])
+def test_a_server_whose_process_dies_or_freezes_ends_the_goal_though_it_is_known(graph, number):
+    process = subprocess.Popen([sys.executable, '-c', SERVER])
+    try:
+        caller = GoalCaller(graph.node, FollowPath, 'follow_path')
+        end = in_thread(lambda: caller.run(follow(1), accept_timeout=60.0))
+        graph.until(lambda: caller._liveliness._living)
+        process.send_signal(number)
+        # Though the middleware knows it for 20 s.
+        with pytest.raises(UnavailableError, match='lives no more'):
+            end()
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_a_result_that_is_lost_is_asked_for_again(graph, monkeypatch):

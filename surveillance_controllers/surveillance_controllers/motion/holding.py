@@ -3,23 +3,27 @@
 A stop has two paths. `collision_monitor` lets no command through to the base; whoever drives the
 robot commands nothing. Each hears the wish itself (topic `stop_requested`), so that one of them may
 be dead. Who drives repeats the wish until the monitor has taken it, also to a monitor that begins
-anew and could keep nothing.
+anew and could keep nothing. Until then it keeps the wish in the file that the monitor reads when it
+begins: whoever drives may die before that.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from state_machines import Interrupt
-from surveillance_interfaces.msg import StopRequest
+from surveillance_interfaces.msg import StopRequest as StopRequestMessage
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
-from surveillance_runtime.stop_request import TOPIC
+from surveillance_runtime.stop_keeper import StopKeeper
+from surveillance_runtime.stop_request import TOPIC, StopFile, StopRequest, own_file
 
 STOPPED = 'stopped'
 """Topic of `collision_monitor`: a person has stopped the robot."""
@@ -47,8 +51,11 @@ class Hold:
     def __init__(self, node: PatrolNode, on_change: Callable[[], None] = lambda: None) -> None:
         self._on_change = on_change
         self._reasons: set[str] = set()
-        self._wish = StopRequest()
+        self._wish = StopRequestMessage()
         self._taken_by: bytes | None = None
+        own = own_file(node.context.get_domain_id(), node.get_namespace(), os.environ)
+        self._keeper = StopKeeper(node, StopFile(own))
+        self._kept = False
         self.begun, self.ended = Interrupt(), Interrupt()
         self.ended.set()
         # Where the owner does not run, nobody else may have the robot stand for ever.
@@ -56,11 +63,15 @@ class Hold:
             node, Bool, STOPPED, self._on_stopped, owner='collision_monitor', only=True, each=True
         )
         StateSubscription(node, Bool, PAUSED, self._on_paused, owner='robot_behavior', only=True)
-        node.create_subscription(StopRequest, TOPIC, self._on_request, 10)
-        self._requests = node.create_publisher(StopRequest, TOPIC, 10)
-        node.create_service(SetBool, 'motion/stop', self._on_service)
+        node.create_subscription(StopRequestMessage, TOPIC, self._on_request, 10)
+        self._requests = node.create_publisher(StopRequestMessage, TOPIC, 10)
+        # While one waits for the disk, everything else is handled.
+        aside = ReentrantCallbackGroup()
+        node.create_service(SetBool, 'motion/stop', self._on_service, callback_group=aside)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(REPEAT, self._repeat, clock=steady, autostart=False)
+        self._timer = node.create_timer(
+            REPEAT, self._repeat, clock=steady, autostart=False, callback_group=aside
+        )
 
     def _on_stopped(self, message: Bool) -> None:
         if message.data:
@@ -78,28 +89,41 @@ class Hold:
     def _on_paused(self, message: Bool) -> None:
         self._set(PAUSED, message.data)
 
-    def _on_request(self, message: StopRequest) -> None:
+    def _on_request(self, message: StopRequestMessage) -> None:
         if STOPPED not in self._reasons:
             self._wish = message
             self._set(STOPPED, True)
             self._timer.reset()
 
-    def _on_service(self, request: Any, response: Any) -> Any:
+    async def _on_service(self, request: Any, response: Any) -> Any:
         if request.data:
-            self._on_request(StopRequest(owner='motion/stop'))
+            self._on_request(StopRequestMessage(owner='motion/stop'))
+            problem = await self._keep()
         else:
+            was_kept = self._kept
             self._release()
+            problem = await self._keeper.forget() if was_kept else ''
         response.success = True
         response.message = 'the robot stands' if self.active else 'the robot may move again'
+        if problem:
+            response.message += f', but a restart may find it otherwise: {problem}'
         return response
 
+    async def _keep(self) -> str:
+        """Keep a wish that the monitor has not taken; return why it is not known to be kept."""
+        if self._kept or self._taken_by is not None:
+            return ''
+        self._kept = True
+        return await self._keeper.keep(StopRequest.heard(self._wish.owner, self._wish.reason))
+
     def _release(self) -> None:
-        self._taken_by = None
+        self._taken_by, self._kept = None, False
         self._set(STOPPED, False)
 
-    def _repeat(self) -> None:
+    async def _repeat(self) -> None:
         if STOPPED in self._reasons and self._taken_by is None:
             self._requests.publish(self._wish)
+            await self._keep()
         else:
             self._timer.cancel()
 

@@ -18,10 +18,12 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalStatus, GoalStatusArray
 from rclpy.action import ActionClient
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import QoSLivelinessChangedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import LivelinessPolicy, QoSProfile
 from rclpy.task import Future
 
 from state_machines.clock import Interrupt
@@ -33,6 +35,7 @@ from state_machines.exceptions import (
 )
 from state_machines.ros.waiting import (
     ACTION_CLIENT_QOS,
+    ALIVE_WITHIN,
     CLIENT_QOS,
     own,
     stopping_of,
@@ -73,6 +76,15 @@ ASKED_AT_MOST = 5
 
 CANCEL_PERIOD = 0.5
 """Seconds after which a cancel that was not answered is sent again."""
+
+
+REVIVED_WITHIN = 0.8
+"""Seconds that a server which tells no more that it lives has to do so again: what it told may have
+come late, on a busy machine."""
+
+
+_PREFIX = 12
+"""So many bytes of a DDS identifier are that of its participant (DDSI-RTPS 2.5, 8.2.4.1)."""
 
 
 class RoundTrips:
@@ -135,6 +147,10 @@ class _Servers:
         self._topic = f'rq{service}Request'  # as every ROS on DDS calls it
         self._is_ready = is_ready
         self._what = what
+
+    def in_processes(self) -> frozenset[tuple[int, ...]]:
+        """Return which participants of DDS they are in: the beginning of their identifiers."""
+        return frozenset(each[:_PREFIX] for each in self._known())
 
     def look_for_loss(self, doubtful_seconds: float = math.inf) -> Callable[[], None]:
         """Return a look that raises `UnavailableError` once the server will never answer.
@@ -413,6 +429,78 @@ _STATUS = {
 }
 
 
+class _Liveliness:
+    """Whether the servers of an action live, as far as they tell by their status (`ALIVE_WITHIN`).
+
+    Foreign servers tell nothing of it by default, and neither does Fast DDS inside a participant:
+    such a server lives and dies with its client. That one of several died is not seen: whose status
+    it was the middleware does not tell.
+
+    Args:
+        node: The node that calls.
+        action: The action's name, relative to the node's namespace.
+        servers: Those of the action.
+        what: Names the server in errors.
+    """
+
+    def __init__(self, node: Node, action: str, servers: _Servers, what: str) -> None:
+        self._node = node
+        self._servers = servers
+        self._what = what
+        self._living = self._dead = 0
+        self._died = -math.inf
+        self._subscription = node.create_subscription(
+            GoalStatusArray,
+            f'{action}/_action/status',
+            lambda _status: None,
+            QoSProfile(
+                depth=1,
+                liveliness=LivelinessPolicy.AUTOMATIC,
+                liveliness_lease_duration=ALIVE_WITHIN,
+            ),
+            callback_group=ReentrantCallbackGroup(),
+            event_callbacks=SubscriptionEventCallbacks(
+                liveliness=self._on_change, use_default_callbacks=False
+            ),
+        )
+
+    def _on_change(self, told: QoSLivelinessChangedInfo) -> None:
+        if self._living and not told.alive_count:
+            self._died = time.monotonic()
+        self._living, self._dead = told.alive_count, told.not_alive_count
+
+    def _is_back(self) -> bool:
+        # A dead one is known until it is forgotten; one that tells nothing may have come then.
+        return self._living > 0 or not self._dead
+
+    def look_for_death(self) -> Callable[[], None]:
+        """Return a look that raises `UnavailableError` once the server that lives lives no more."""
+        lived = False
+
+        def look() -> None:
+            nonlocal lived
+            lived = lived or self._living > 0
+            if not lived or self._living or time.monotonic() <= self._died + REVIVED_WITHIN:
+                return
+            if self._is_own():
+                lived = False
+                return
+            raise UnavailableError(f'{self._what}: the server lives no more', self._is_back)
+
+        look()
+        return look
+
+    def _is_own(self) -> bool:
+        """Tell whether a server is in the client's participant."""
+        readers = self._node.get_subscriptions_info_by_topic(self._subscription.topic_name)
+        own = self._node.get_name(), self._node.get_namespace()
+        return any(
+            tuple(reader.endpoint_gid)[:_PREFIX] in self._servers.in_processes()
+            for reader in readers
+            if (reader.node_name, reader.node_namespace) == own
+        )
+
+
 class _ActionClient(ActionClient):
     """An action client that takes no answer before it has noted what it asked.
 
@@ -479,6 +567,7 @@ class GoalCaller:
         self._what = f'action {name}'
         results = node.resolve_service_name(f'{name}/_action/get_result')
         self._servers = _Servers(node, results, self.is_ready, self._what)
+        self._liveliness = _Liveliness(node, name, self._servers, self._what)
         self._executor_patience = executor_patience
         self._spun = threading.Event()
         self._spin = node.create_guard_condition(self._spun.set)
@@ -536,18 +625,19 @@ class GoalCaller:
         deadline = time.monotonic() + accept_timeout
         await_ready(self.is_ready, deadline, interrupt, self._what)
         # From before the goal is sent: a server that goes right after its yes is seen going.
-        look = self._servers.look_for_loss()
+        look, look_for_death = self._servers.look_for_loss(), self._liveliness.look_for_death()
         deadline += self.round_trips.deadline(accept_timeout) - accept_timeout
         handle = self._send(goal, deadline, interrupt, on_feedback)
         if not handle.accepted:
             return GoalEnd('rejected', None)
         look_at_executor = self._look_at_executor()
 
-        def look_at_both() -> None:
+        def look_at_all() -> None:
             look()
+            look_for_death()
             look_at_executor()
 
-        running = _RunningGoal(handle, look_at_both, self._what)
+        running = _RunningGoal(handle, look_at_all, self._what)
         try:
             return running.await_end(result_timeout, interrupt)
         except UnavailableError:
@@ -575,7 +665,13 @@ class GoalCaller:
             def feedback(message: Any) -> None:
                 told(message.feedback)
 
-        look = self._servers.look_for_loss(DOUBTFUL_SECONDS)
+        look_for_loss = self._servers.look_for_loss(DOUBTFUL_SECONDS)
+        look_for_death = self._liveliness.look_for_death()
+
+        def look() -> None:
+            look_for_loss()
+            look_for_death()
+
         sent = self._client.send_goal_async(goal, feedback_callback=feedback)
         try:
             with self.round_trips.measured():

@@ -16,7 +16,13 @@ from rclpy.clock import JumpThreshold, ROSClock
 from rclpy.duration import Duration
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
 from rclpy.task import Future
 
 from state_machines.clock import Interrupt
@@ -39,13 +45,27 @@ of other clients too."""
 CLIENT_QOS = _service_qos(2000)
 """For clients of services: answers that arrive while the executor is busy are kept."""
 
+ALIVE_WITHIN = Duration(seconds=1.5)
+"""The middleware of an action server tells at least so often that its process lives (DDS 1.4,
+2.2.3.11, by itself: no thread of Python is needed). Clients learn by that that one was killed, and
+not by the 20 s after which a silent process is forgotten."""
+
+STATUS_QOS = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    liveliness=LivelinessPolicy.AUTOMATIC,
+    liveliness_lease_duration=ALIVE_WITHIN,
+)
+"""For an action's status: rcl's own, and that the server lives."""
+
 ACTION_SERVER_QOS = {
     f'{service}_service_qos_profile': SERVICE_QOS for service in ('goal', 'result', 'cancel')
-}
+} | {'status_pub_qos_profile': STATUS_QOS}
 ACTION_CLIENT_QOS = {
     f'{service}_service_qos_profile': CLIENT_QOS for service in ('goal', 'result', 'cancel')
 }
-"""The same for the three services of an action, as arguments of rclpy's classes."""
+"""The same for the three services of an action, and its status, as arguments of rclpy's classes."""
 
 
 def own(node: Node, entity: Any) -> None:
