@@ -25,7 +25,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.sizes import Size, sized_parser, skip
-from indoor_watch.persons import PersonFinder, load_finder
+from indoor_watch.detectors import load_detector
+from indoor_watch.persons import PersonFinder
 
 ENDINGS = ('.jpg', '.jpeg', '.png')
 
@@ -36,13 +37,19 @@ def pictures(given: list[Path]) -> list[Path]:
     return sorted(each for each in found if each.suffix.lower() in ENDINGS)
 
 
-def measured(finder: PersonFinder, paths: list[Path]) -> tuple[list[str], float]:
+def measured(
+    finder: PersonFinder, paths: list[Path], light: float = 1.0
+) -> tuple[list[str], float]:
     """Return the names of the pictures with a find, and milliseconds of CPU a picture."""
     hits, spent = [], 0.0
+    rng = np.random.default_rng()
     for path in paths:
         read = cv2.imread(str(path))
         if read is None:
             continue
+        if light < 1.0:
+            # A camera's noise does not become less in the dark.
+            read = np.clip(np.rint(read * light + rng.normal(0.0, 2.0, read.shape)), 0, 255)
         began = time.process_time()
         if finder.find(np.asarray(read, np.uint8)):
             hits.append(path.name)
@@ -76,29 +83,46 @@ def main() -> None:
     parser = sized_parser(__doc__)
     parser.add_argument('--with', dest='persons', type=Path, nargs='*', default=[])
     parser.add_argument('--without', type=Path, nargs='*', default=[])
+    parser.add_argument('--weights', default='', help='an ONNX file, or a frozen graph')
+    parser.add_argument('--light', type=float, default=1.0, help='of what the pictures had')
     parser.add_argument('--crops', type=int, default=0, help='of each picture without persons')
     given = parser.parse_args()
     try:
-        finder = load_finder()
+        detector = load_detector(given.weights)
     except ValueError as error:
         skip(str(error))
+    name, finder = detector.name, PersonFinder(detector)
     if given.size is Size.SMOKE:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / 'grey.png'
             cv2.imwrite(str(path), np.full((240, 320, 3), 128, np.uint8))
-            compare(finder, [], [path], 1)
+            compare(name, finder, [], [path], 1)
     else:
-        compare(finder, pictures(given.persons), pictures(given.without), given.crops)
+        compare(
+            name,
+            finder,
+            pictures(given.persons),
+            pictures(given.without),
+            given.crops,
+            given.light,
+        )
 
 
-def compare(finder: PersonFinder, persons: list[Path], without: list[Path], crops: int) -> None:
+def compare(
+    name: str,
+    finder: PersonFinder,
+    persons: list[Path],
+    without: list[Path],
+    crops: int,
+    light: float = 1.0,
+) -> None:
     """Print what is found in pictures with persons and without, and in parts of the latter."""
-    print(f'{"":12} {"found":>10} {"false":>10} {"ms CPU":>8}')
-    hits, first = measured(finder, persons)
-    false, second = measured(finder, without)
+    print(f'{"":40} {"found":>10} {"false":>10} {"ms CPU":>8}')
+    hits, first = measured(finder, persons, light)
+    false, second = measured(finder, without, light)
     spent = (first * len(persons) + second * len(without)) / max(1, len(persons + without))
     found, wrong = f'{len(hits)}/{len(persons)}', f'{len(false)}/{len(without)}'
-    print(f'{"SSDLite":12} {found:>10} {wrong:>10} {spent:8.0f}   {", ".join(false)}')
+    print(f'{name:40} {found:>10} {wrong:>10} {spent:8.0f}   {", ".join(false)}')
     missed = [each.name for each in persons if each.name not in hits]
     print(f'missed: {", ".join(missed) or "none"}')
     if crops:

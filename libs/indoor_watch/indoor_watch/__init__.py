@@ -15,11 +15,11 @@ rules come from `read_watch_file`. Time, poses and pictures are handed in; nothi
 Each name is imported when it is first used; OpenCV only then.
 
 Public modules: `answers` (what a person says of events), `work_queue` (of one thread), `day_book`
-(what was seen on a day), `doors`, `hung_markers` (where markers hang), `inspection_plan`,
-`marker_checks` and `viewpoints` (from where to look), `lost_sight` (what of the sensors was of no
-use), `other_robots`, `persons` (who is in a picture), `privacy` (pictures that may leave the
-machine), `reference_views`, `sees_around`, `views` (what differs between two pictures), `visit`,
-`ways` (what a thing blocks).
+(what was seen on a day), `detectors` and `onnx_network` (networks that find persons), `doors`,
+`hung_markers` (where markers hang), `inspection_plan`, `marker_checks` and `viewpoints` (from where
+to look), `lost_sight` (what of the sensors was of no use), `other_robots`, `persons` (who is in a
+picture), `privacy` (pictures that may leave the machine), `reference_views`, `sees_around`, `views`
+(what differs between two pictures), `visit`, `ways` (what a thing blocks).
 """
 
 from __future__ import annotations

@@ -62,6 +62,7 @@ class Alerting:
         self._store, self._drawn = store, drawn
         self._verify_seconds = verify_seconds
         self._habits = Habits()
+        self._by_words = {each.words(): each for each in self.rules}
         self._doubts: dict[int, float] = {}
         # Events that nobody could look at again in time: told once.
         self._given_up: set[int] = set()
@@ -132,6 +133,18 @@ class Alerting:
         """Take that what made some events is seen no more."""
         for number in numbers:
             self.book.end(number, stamp)
+
+    def accept(self, stamp: float) -> None:
+        """Take as normal what goes on for so long as its rule says.
+
+        Args:
+            stamp: Now, seconds since 1970.
+        """
+        for event in self.book.current:
+            rule = self._by_words.get(event.rule)
+            is_due = rule is not None and stamp - event.began >= rule.accepted
+            if is_due and event.state in (EventState.OPEN, EventState.ACKNOWLEDGED):
+                self.book.answer(event.number, EventState.NORMAL)
 
     def doubts(self, stamp: float) -> list[Event]:
         """Return the alerts that wait until the robot has looked again.

@@ -22,6 +22,7 @@ from indoor_watch.evidence import EvidenceStore
 from indoor_watch.floor_monitor import FloorMonitor
 from indoor_watch.hung_markers import CameraView, HungSpot, SeenMarker
 from indoor_watch.marker_monitor import MarkerMonitor
+from indoor_watch.movables import Movables
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.other_robots import OtherRobots
 from indoor_watch.person_monitor import PersonMonitor
@@ -120,6 +121,11 @@ class ChangeMonitor:
         return self._alerting.rules
 
     @property
+    def movables(self) -> Movables:
+        """What moves often."""
+        return self._floor.movables
+
+    @property
     def _current(self) -> list[Event]:
         return self._alerting.book.current
 
@@ -143,6 +149,7 @@ class ChangeMonitor:
         """
         self._heed_clock(stamp)
         self._compare(stamp)
+        self._alerting.accept(stamp)
         # A clock that was set back is no reason to stand for ever.
         if self.visit.place and not 0.0 <= stamp - self.visit.stood_since < LONGEST_STAND:
             self._begin(self.visit.place, stamp)
@@ -159,6 +166,7 @@ class ChangeMonitor:
                 gone = self._persons.gone(self._current, ended, self._floor.is_as_before)
                 self._alerting.end(gone, stamp)
         self._floor.learn(ended, self._current)
+        self._alerting.take(self._floor.baseline(ended, stamp), ended)
         self._persons.begin()
         self._registration.begin()
         self.visit = ended.next(place, stamp)
@@ -250,6 +258,10 @@ class ChangeMonitor:
         is_marker = event.kind == Kind.MARKER and event.seen != 'unknown'
         if state == EventState.NORMAL and is_marker:
             self._markers.hung.accept(int(event.subject))
+        if state == EventState.FALSE and event.seen == 'movable' and event.position is not None:
+            thing = self.movables.near(event.position)
+            if thing is not None:
+                self.movables.undo(thing.number)
         return event
 
     def pass_by(self, pose: Points, seen: Sequence[SeenMarker]) -> None:
@@ -273,6 +285,7 @@ class ChangeMonitor:
             'look': self.visit.number,
             'hung': self._markers.hung.state(),
             'views': self._views.views.state(),
+            'movables': self.movables.state(),
         }
 
     def restore(self, kept: Mapping[str, Any]) -> None:
@@ -286,5 +299,6 @@ class ChangeMonitor:
             restore(self._floor, kept['normal'])
             restore(self._markers.hung, kept['hung'])
             restore(self._views.views, kept['views'])
+            restore(self.movables, kept.get('movables', {'things': [], 'next': 1}))
             restore(self._alerting, kept)
         self.visit.number = number

@@ -95,10 +95,14 @@ class Event:
         where = f'{self.place}: ' if self.place else ''
         if instead is not None:
             said = instead.kind.words(instead.state, instead.subject)
+            if instead.state == 'movable':
+                return f'{where}{said}'
             return f'{where}{said} again (was {self.seen})'
         said = self.kind.words(self.seen, self.subject)
         if self.state == EventState.OVER:
             return f'{where}it is seen no more that {said}'
+        if self.state == EventState.NORMAL:
+            return f'{where}{said}: taken as normal'
         return f'{where}{said}: a person calls it {self.state}'
 
     def to_json(self) -> dict[str, Any]:
@@ -428,6 +432,10 @@ def _ends(event: Event, seen: Observation) -> bool:
     """
     if seen.state == 'nobody walks' and (event.seen == 'nobody' or 'camera' in event.sensors):
         return False
+    if event.kind == Kind.OBJECT and (event.seen == 'movable' or seen.state == 'unmapped'):
+        return False  # beside it something else has come, or stood before the first look
+    if event.seen == 'unmapped':
+        return seen.state == 'removed'
     return not _agrees(event, seen)
 
 

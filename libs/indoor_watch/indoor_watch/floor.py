@@ -293,6 +293,18 @@ def changes(before: FloorView, now: FloorView) -> list[ObjectChange]:
     return sorted(found, key=lambda each: -each.extent)
 
 
+def unmapped(view: FloorView, cells: Mask) -> list[ObjectChange]:
+    """Return the things that a visit saw and the map does not show, the largest first.
+
+    Args:
+        view: What it saw.
+        cells: Of its occupied cells those that are asked for.
+    """
+    found = _things(view.grid, cells, np.ones_like(cells))
+    things = [_changed(Change.APPEARED, each) for each in found]
+    return sorted(things, key=lambda each: -each.extent)
+
+
 def is_leaf(points: Points, hinge: tuple[float, float], width: float) -> bool:
     """Tell whether a thing may be the leaf of a door, that swings about its hinge.
 

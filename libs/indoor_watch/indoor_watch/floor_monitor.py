@@ -1,7 +1,8 @@
 """What stands on the floor where nothing stood, what is gone, and which ways that blocks.
 
-What the first look at each part of the floor shows is normal. A thing must be seen in two
-assessments before it is told.
+What the first look at each part of the floor shows is normal; what of it the map does not show is
+told once, so that a person accepts it. A thing must be seen in two assessments before it is told,
+and what moves often is told no more (`movables`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,15 @@ from floor_plans import Grid
 from indoor_watch import floor_layers
 from indoor_watch.events import Event
 from indoor_watch.evidence import sweep_picture
-from indoor_watch.floor import Change, FloorView, FloorVisit, ObjectChange, changes
+from indoor_watch.floor import (
+    Change,
+    FloorView,
+    FloorVisit,
+    ObjectChange,
+    changes,
+    unmapped,
+)
+from indoor_watch.movables import Movables
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.persons import Picture
 from indoor_watch.visit import LidarSweep, Pictured, Visit
@@ -49,6 +58,7 @@ class FloorMonitor:
     Attributes:
         grid: The map; None before it came.
         normal: What stands there normally; None: nothing is known.
+        movables: What moves often.
     """
 
     def __init__(
@@ -61,12 +71,15 @@ class FloorMonitor:
         self._kept: Mapping[str, Any] = {}
         self.grid: Grid | None = None
         self.normal: FloorView | None = None
+        self.movables = Movables()
+        # Cells that are normal since a first look, and of which nothing was told yet.
+        self._untold: Mask | None = None
 
     def use_map(self, grid: Grid) -> bool:
         """Take the map; tell whether it is another one: what was normal before is forgotten."""
         if self.grid is not None and floor_layers.same_map(self.grid, grid):
             return False
-        self.grid, self.normal = grid, None
+        self.grid, self.normal, self._untold = grid, None, None
         self._ways = None if self._ways_of is None else self._ways_of(grid)
         if self._kept:
             self.normal = floor_layers.unpacked(self._kept, grid)
@@ -89,7 +102,15 @@ class FloorMonitor:
             return []
         found = [each for each in changes(self.normal, now) if not self._may_be_leaf(each.points)]
         again = [each for each in found if _was_there(each, visit.things)]
+        placed = [(visit.place_of(each.position), each) for each in again]
+        news, movable = self.movables.take(placed, stamp)
         told = [
+            Observation(
+                Kind.OBJECT, 'movable', each.place, position=each.spots[-1][:2], stamp=stamp
+            )
+            for each in movable
+        ]
+        told += [
             Observation(
                 Kind.OBJECT,
                 str(each.change),
@@ -100,7 +121,7 @@ class FloorMonitor:
                 stamp=stamp,
                 compared_with='' if each.before is None else '{:.2f} {:.2f}'.format(*each.before),
             )
-            for each in again
+            for each in news
         ]
         told += self._blocked(now, again, visit, stamp)
         visit.things = found
@@ -144,6 +165,8 @@ class FloorMonitor:
             at = event.position
             if event.kind not in (Kind.OBJECT, Kind.WAY) or at is None:
                 continue
+            if event.seen == 'movable':
+                continue
             if any(math.dist(each.position, at) < 2 * SAME_THING for each in visit.things):
                 continue
             if event.seen == Change.REMOVED:
@@ -181,8 +204,11 @@ class FloorMonitor:
         now = self._view(visit)
         if now is None:
             return
+        if self._untold is None:
+            self._untold = np.zeros_like(now.occupied)
         if self.normal is None:
             self.normal = now
+            self._untold |= now.occupied
             return
         new = ~self.normal.seen
         there = [each.points for each in visit.things if each.change != Change.REMOVED]
@@ -201,12 +227,39 @@ class FloorMonitor:
         if things.any():
             away = ndimage.distance_transform_edt(~things) * now.grid.resolution
             new &= away > OTHER_SIDES
+        self._untold |= now.occupied & new
         self.normal = replace(
             self.normal,
             occupied=self.normal.occupied | (now.occupied & new),
             free=self.normal.free | (now.free & new),
             moving=np.zeros_like(now.moving),
         )
+
+    def baseline(self, visit: Visit, stamp: float) -> list[Pictured]:
+        """Return what a first look showed and the map does not, once.
+
+        Args:
+            visit: The visit, after it was learned from.
+            stamp: When, seconds since 1970.
+        """
+        if self._untold is None or self.normal is None or not self._untold.any():
+            return []
+        found = unmapped(self.normal, self._untold)
+        self._untold = None
+        return [
+            Pictured(
+                Observation(
+                    Kind.OBJECT,
+                    'unmapped',
+                    visit.place_of(each.position),
+                    position=each.position,
+                    confidence=each.confidence,
+                    stamp=stamp,
+                )
+            )
+            for each in found
+            if not self._may_be_leaf(each.points)
+        ]
 
     def drawn(
         self, middle: tuple[float, float], visit: Visit

@@ -54,12 +54,18 @@ class Kind(StrEnum):
     )
     OBJECT = (
         'object',
-        ('appeared', 'removed', 'moved'),
-        ('none',),
+        ('appeared', 'removed', 'moved', 'unmapped', 'movable'),
+        # Nothing new; nothing that the map lacks.
+        ('none', 'mapped'),
         'anything that was not there before',
         '',
         '',
-        {'appeared': '{thing} has appeared', 'moved': '{thing} was moved'},
+        {
+            'appeared': '{thing} has appeared',
+            'moved': '{thing} was moved',
+            'unmapped': '{thing} stands where the map shows none',
+            'movable': '{thing} moves often, is movable from now on',
+        },
     )
     MARKER = (
         'marker',

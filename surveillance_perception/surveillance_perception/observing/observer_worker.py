@@ -125,7 +125,7 @@ class ObserverWorker:
         Raises:
             ValueError: What was wrong, and what was expected.
         """
-        answer = answered(self._book, line, self.monitor.answer)
+        answer = answered(self._book, line, self.monitor.answer, self.monitor.movables)
         self._teller.answered(line, answer)
         self._tell_events()
         return answer
