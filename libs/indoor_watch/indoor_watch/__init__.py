@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from indoor_watch.watch_rules import WatchRule as WatchRule
     from indoor_watch.watch_rules import read_watch_file as read_watch_file
     from indoor_watch.watch_rules import rule_from as rule_from
+    from indoor_watch.watch_rules import with_baseline as with_baseline
 
 _HOME = {
     'ChangeMonitor': 'change_monitor',
@@ -60,6 +61,7 @@ _HOME = {
     'read_watch_file': 'watch_rules',
     'rule_from': 'watch_rules',
     'same_map': 'floor_layers',
+    'with_baseline': 'watch_rules',
 }
 __all__ = list(_HOME)
 

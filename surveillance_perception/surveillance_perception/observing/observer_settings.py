@@ -9,11 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from indoor_watch import DEFAULT_RULES, EvidenceStore, WatchRule, read_watch_file
+from indoor_watch import (
+    DEFAULT_RULES,
+    EvidenceStore,
+    WatchRule,
+    read_watch_file,
+    with_baseline,
+)
 from indoor_watch.onnx_network import RUNTIMES
 from indoor_watch.persons import Person, load_finder
 from indoor_watch.reference_views import ReferenceViews
-from indoor_watch.watch_rules import with_baseline
 from lidar_navigation.robot_base import robot_radius
 from strict_files.files import FileError
 from strict_files.settings import parameter
