@@ -74,6 +74,7 @@ KNOWING_ROS = {
     'surveillance_controllers.motion.navigation_motion',
     'surveillance_controllers.motion.place_recording',
     'surveillance_controllers.motion.pose_reports',
+    'surveillance_runtime.sensing.mount_watch',
     'surveillance_runtime.sensing.sensors',
     'surveillance_runtime.sensing.silence',
     'surveillance_runtime.sensing.transforms',

@@ -134,11 +134,7 @@ def within_limit(wanted: Velocity, pose: Pose, zones: Zones, settings: MonitorSe
     """Return a velocity on the same arc with the speed that slow zones allow at a pose."""
     x, y, yaw = pose
     ahead = yaw if wanted.speed >= 0.0 else yaw + math.pi
-    limit = zones.speed_limit((x, y, ahead), settings.deceleration / 2)
-    if abs(wanted.speed) <= limit:
-        return wanted
-    share = limit / abs(wanted.speed)
-    return Velocity(wanted.speed * share, wanted.turn * share)
+    return wanted.slowed_to(zones.speed_limit((x, y, ahead), settings.deceleration / 2))
 
 
 def allowed(wanted: Velocity, seen: Points, settings: MonitorSettings) -> Velocity:

@@ -57,6 +57,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.sensing.mount_watch import MountWatch
 from surveillance_runtime.sensing.sensors import OdometryReader
 from surveillance_runtime.sensing.silence import SensorWatch
 from surveillance_runtime.sensing.transforms import MapFrame, MapFrameReader, ScanReader
@@ -116,6 +117,7 @@ class Explorer(PatrolNode):
         mapping = self.declare_fields(MappingParameters(), prefix='mapping.')
         self._frames = declared_frames(self, 'map', 'odom', 'base', 'transform_tolerance')
         self._lidar = ScanReader(self, drive.radius, self._frames.base)
+        self._mounts = MountWatch(self, self._lidar)
         self._foreign = ForeignMap() if self._settings.mapping == TOPIC else None
         self.exploration = Exploration(
             self._foreign or MapBuilder(parameters=mapping), drive, planning, frontiers
@@ -124,7 +126,6 @@ class Explorer(PatrolNode):
         # Another program that maps has its own way with odometry that begins anew.
         self._continuous = ContinuousOdometry() if self._foreign is None else None
         self._odometry: Pose | None = None
-        self._reading: Pose | None = None
         self._heard_scan = False
         self._scans = self._left_out = self._told_left_out = 0
         # No setting of the clock makes a drive wait, or give up.
@@ -191,7 +192,8 @@ class Explorer(PatrolNode):
             self._base.hear('odom')
             pose = reading if self._continuous is None else self._continuous.take(reading, measured)
             self._readings.add(measured, pose)
-            self._odometry, self._reading = pose, reading
+            self._mounts.move(pose, measured)
+            self._odometry = pose
 
     def _on_scan(self, topic: str, scan: Scan, message: LaserScan) -> None:
         stamp = message.header.stamp
@@ -199,12 +201,14 @@ class Explorer(PatrolNode):
             self._base.hear(topic)
             if self._odometry is None:
                 return
-            odometry, reading = self._odometry, self._reading
+            odometry, reading = self._odometry, self._odometer.reading
+            self._mounts.see(topic, scan, message)
             seen = joined_if_known(scan, self._readings, seconds_of(stamp))
             self._heard_scan = True
             self._scans += 1
             self._left_out += seen is None
-            stands = self._hold.active or self.stopping.is_set()
+            wrong = self._mounts.problem
+            stands = self._hold.active or self.stopping.is_set() or bool(wrong)
             passed = self._wait.elapsed()
             # Where it was made is not known: it is driven by, and no part of the map.
             velocity = self.exploration.see(
@@ -214,7 +218,7 @@ class Explorer(PatrolNode):
                 stands=stands,
                 maps=seen is not None,
             )
-            self._base.command(velocity)
+            self._base.command(velocity.slowed_to(self._mounts.top_speed))
         self._tell_pose(odometry, reading, stamp)
 
     def _on_hold(self) -> None:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from lidar_navigation.exploration.map_building import MappingParameters as MappingParameters
     from lidar_navigation.footprint import Footprint as Footprint
     from lidar_navigation.localisation.localisation import Localiser as Localiser
+    from lidar_navigation.localisation.mount_check import MountCheck as MountCheck
+    from lidar_navigation.localisation.mount_check import MountFinding as MountFinding
     from lidar_navigation.localisation.place_locator import PlaceLocator as PlaceLocator
     from lidar_navigation.planning.grid_planning import GridPlanner as GridPlanner
     from lidar_navigation.planning.grid_planning import NoPathError as NoPathError
@@ -45,6 +47,8 @@ _HOME = {
     'Localiser': 'localisation.localisation',
     'MapBuilder': 'exploration.map_building',
     'MappingParameters': 'exploration.map_building',
+    'MountCheck': 'localisation.mount_check',
+    'MountFinding': 'localisation.mount_check',
     'Navigator': 'driving.navigator',
     'NoPathError': 'planning.grid_planning',
     'Phase': 'exploration.exploration',

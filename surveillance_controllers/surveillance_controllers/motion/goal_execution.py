@@ -43,6 +43,7 @@ class GoalExecution:
         wait_for_peer: How long the planner may take to answer, seconds.
         sensor_timeout: A goal fails when nothing of use came for so long, seconds.
         holds: Whether the robot is held where it is.
+        problem: Why it is not to be driven; empty: it may be.
 
     Attributes:
         lock: Held by whoever touches the navigator.
@@ -57,6 +58,7 @@ class GoalExecution:
         wait_for_peer: float,
         sensor_timeout: float,
         holds: Callable[[], bool],
+        problem: Callable[[], str] = str,
     ) -> None:
         self.lock = threading.RLock()
         self._node, self._navigator, self._base, self._robot = node, navigator, base, robot
@@ -65,6 +67,7 @@ class GoalExecution:
             sensor_timeout,
             holds,
         )
+        self._problem = problem
         self._stepped = threading.Condition(self.lock)
         self._steps = 0
         self._awaited: Callable[[], bool] = lambda: False
@@ -179,12 +182,16 @@ class GoalExecution:
         """Wait until a condition holds after a scan, or for the interrupt.
 
         Raises:
-            MotionFailedError: The sensors gave nothing for too long.
+            MotionFailedError: The sensors gave nothing for too long, or what they tell contradicts
+                itself.
         """
         with self._stepped:
             # The worker is woken when there is something to do, not with each scan.
-            self._awaited = condition
+            self._awaited = lambda: condition() or bool(self._problem())
             while not (condition() or interrupt.is_set()):
+                if problem := self._problem():
+                    pose = self._navigator.pose
+                    raise MotionFailedError(problem, None if pose is None else point_of(pose))
                 before = self._steps
                 woken = self._stepped.wait(self._sensor_timeout)
                 if not woken and self._steps == before:

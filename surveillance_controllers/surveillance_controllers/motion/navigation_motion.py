@@ -47,6 +47,7 @@ from surveillance_runtime.place_parameters import (
 )
 from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.sensing.conversions import refusing
+from surveillance_runtime.sensing.mount_watch import MountWatch
 from surveillance_runtime.sensing.sensors import OdometryReader
 from surveillance_runtime.sensing.silence import SensorWatch
 from surveillance_runtime.sensing.transforms import ScanReader
@@ -79,6 +80,7 @@ class NavigationMotion:
         self._settings = node.declare_fields(NavigationSettings(), mode='SIMULATED and ROBOT')
         self._frames = declared_frames(node, 'map', 'odom', 'base', 'transform_tolerance')
         self._lidar = ScanReader(node, robot.radius, self._frames.base)
+        self._mounts = MountWatch(node, self._lidar)
         guesses = [station.pose for station in settings.stations.values()]
         if settings.start_pose:
             x, y, yaw = settings.start_pose
@@ -105,6 +107,7 @@ class NavigationMotion:
             settings.peer_timeout,
             self._settings.sensor_timeout,
             lambda: self.hold.active,
+            lambda: self._mounts.problem,
         )
         positions = place_positions(node)
         self._set_positions(positions)
@@ -117,7 +120,7 @@ class NavigationMotion:
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(node, DoorStates, 'door_states', self._on_doors, owner='simulator')
         self._odometry = OdometryReader(node, self._on_odometry, self._frames)
-        self._reports = PoseReports(node, self._navigator, self._frames, self._odometry.stream)
+        self._reports = PoseReports(node, self._navigator, self._frames, self._odometry)
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
         self._watch = SensorWatch(
@@ -220,6 +223,7 @@ class NavigationMotion:
     def _on_odometry(self, pose: Pose, measured: float) -> None:
         with self._goals.lock:
             self._base.hear('odom')
+            self._mounts.move(pose, measured)
             self._navigator.move(pose, measured)
 
     def _on_initial_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -232,6 +236,10 @@ class NavigationMotion:
                 self._navigator.believe(pose)
 
     def _on_scan(self, topic: str, scan: Scan, message: LaserScan) -> None:
+        with self._goals.lock:
+            self._mounts.see(topic, scan, message)
+            if self._mounts.problem:
+                self._base.command(Velocity())
         self._see(scan, message.header.stamp, topic)
 
     def _see(self, scan: Scan, stamp: Any, topic: str = 'scan') -> None:
@@ -241,8 +249,9 @@ class NavigationMotion:
             self._stands_for_search = False
             velocity = self._navigator.see(scan, measured, topic)
             drives = velocity is not None and self._navigator.task is not None
-            if velocity is not None and drives and not self._stands_for_search:
-                self._base.command(velocity)
+            stands = self._stands_for_search or self._mounts.problem
+            if velocity is not None and drives and not stands:
+                self._base.command(velocity.slowed_to(self._mounts.top_speed))
             self._reports.publish_pose(measured, stamp)
             # Not only a scan makes the robot sure: a pose that somebody tells does, too.
             if self._settings.track_place and self._place != self._place_told:

@@ -17,7 +17,7 @@ from surveillance_runtime.conversions import cloud_from_points, pose_estimate, s
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.record import Frames
-from surveillance_runtime.sensing.sensors import SensorStream
+from surveillance_runtime.sensing.sensors import OdometryReader
 from surveillance_runtime.sensing.transforms import MapFrame
 from surveillance_runtime.state_topics import OwnedTopic
 
@@ -41,7 +41,7 @@ class PoseReports:
     """
 
     def __init__(
-        self, node: PatrolNode, navigator: Navigator, frames: Frames, odometry: SensorStream
+        self, node: PatrolNode, navigator: Navigator, frames: Frames, odometry: OdometryReader
     ) -> None:
         self._node, self._navigator, self._frames = node, navigator, frames
         self._odometry = odometry
@@ -100,9 +100,11 @@ class PoseReports:
             )
             cloud.header.stamp = stamp
             self._obstacles.publish(cloud)
-        if navigator.odometry is not None:
-            offset = self._odometry.offset
-            self._map_frame.publish(navigator.pose, navigator.odometry, stamp, offset)
+        # The driver publishes its transform as it counts, whatever the profile has for its scale.
+        reading = self._odometry.reading or navigator.odometry
+        if reading is not None:
+            offset = self._odometry.stream.offset
+            self._map_frame.publish(navigator.pose, reading, stamp, offset)
 
     def _tell_of_doubt(self) -> None:
         """Call somebody for a robot that stands and does not know where it is."""

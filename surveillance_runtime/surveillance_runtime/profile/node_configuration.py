@@ -30,6 +30,8 @@ _PARAMETERS = {
     'frames.transform_tolerance': ('robot.frames.transform_tolerance',),
     'lidars.mounts': ('lidar_mounts',),
     'lidars.sweep': ('robot.sweep',),
+    'odometry.scale': ('odometry.scale',),
+    'odometry.turn_scale': ('odometry.turn_scale',),
     'lidars.height': ('simulator:physics.lidar_height',),
     'body.height': ('simulator:physics.height',),
     'body.footprint': ('robot.footprint',),

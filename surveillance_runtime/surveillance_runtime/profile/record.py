@@ -171,6 +171,18 @@ class Lidars:
 
 
 @dataclass(frozen=True)
+class OdometryScale:
+    """What the odometry counts beside what is true."""
+
+    scale: float = parameter(
+        1.0, 'Metres driven for each metre that the odometry counts.', 0.1, 10.0
+    )
+    turn_scale: float = parameter(
+        1.0, 'Radians turned for each radian that the odometry counts.', 0.1, 10.0
+    )
+
+
+@dataclass(frozen=True)
 class DriveLimits:
     """What the robot is driven with."""
 
@@ -251,6 +263,7 @@ class RobotProfile:
     frames: Frames = parameters(Frames, 'frames.')
     body: Body = parameters(Body, 'body.')
     lidars: Lidars = parameters(Lidars, 'lidars.')
+    odometry: OdometryScale = parameters(OdometryScale, 'odometry.')
     drive: DriveLimits = parameters(DriveLimits, 'drive.')
     wheels: Wheels = parameters(Wheels, 'wheels.')
     battery: BatterySource = parameters(BatterySource, 'battery.')

@@ -12,7 +12,8 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.subscription import Subscription
 
-from lidar_navigation.geometry import Pose
+from lidar_navigation.geometry import Pose, composed, relative
+from lidar_navigation.localisation.odometry import began_anew
 from surveillance_runtime.conversions import (
     pose_of_serialized,
     seconds_of,
@@ -20,7 +21,7 @@ from surveillance_runtime.conversions import (
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.check_up import BASE_FRAMES
-from surveillance_runtime.profile.record import Frames
+from surveillance_runtime.profile.record import Frames, OdometryScale
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing import conversions
 from surveillance_runtime.stamp_offset import StampOffset
@@ -124,11 +125,13 @@ class OdometryReader:
 
     Args:
         node: The node that reads.
-        take: Called with each reading, and when it was made, seconds of the node's clock.
+        take: Called with each reading, in true metres as the profile has the scale, and when it
+            was made, seconds of the node's clock.
         frames: The names of the frames on `tf`; None: it is not looked at.
 
     Attributes:
         stream: What comes.
+        reading: The last reading as the driver told it; None: none came.
     """
 
     def __init__(
@@ -138,9 +141,12 @@ class OdometryReader:
         frames: Frames | None = None,
     ) -> None:
         self.stream = SensorStream(node, 'odom')
+        self.reading: Pose | None = None
         self._node = node
         self._take = take
         self._by_tf: Subscription | None = None
+        self._scale = node.declare_fields(OdometryScale(), prefix='odometry.')
+        self._scaled: tuple[Pose, float] | None = None
         StateSubscription(
             node,
             Odometry,
@@ -161,7 +167,7 @@ class OdometryReader:
         with conversions.refusing(self._node, 'odom'):
             measured = self.stream.come(stamp_of_serialized(serialized), serialized)
             if measured is not None:
-                self._take(pose_of_serialized(serialized, texts=1), measured)
+                self._take(self._true(pose_of_serialized(serialized, texts=1), measured), measured)
                 self.stream.hear()
 
     def _look_for_topic(self) -> None:
@@ -183,5 +189,23 @@ class OdometryReader:
                 measured = self.stream.come(seconds_of(each.header.stamp), matrix.tobytes())
                 if measured is not None:
                     x, y = matrix[:2, 3].tolist()
-                    self._take((x, y, math.atan2(matrix[1, 0], matrix[0, 0])), measured)
+                    pose = x, y, math.atan2(matrix[1, 0], matrix[0, 0])
+                    self._take(self._true(pose, measured), measured)
                     self.stream.hear()
+
+    def _true(self, reading: Pose, measured: float) -> Pose:
+        """Return a reading in true metres and radians."""
+        before, self.reading = self.reading, reading
+        if self._scale == OdometryScale():
+            return reading
+        pose = reading
+        if (
+            before is not None
+            and self._scaled is not None
+            and not began_anew(before, reading, measured - self._scaled[1])
+        ):
+            x, y, turn = relative(before, reading)
+            k = self._scale.scale
+            pose = composed(self._scaled[0], (k * x, k * y, self._scale.turn_scale * turn))
+        self._scaled = pose, measured
+        return pose

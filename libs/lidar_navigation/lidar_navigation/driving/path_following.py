@@ -80,6 +80,13 @@ class Velocity:
     speed: float = 0.0
     turn: float = 0.0
 
+    def slowed_to(self, top: float) -> Velocity:
+        """Return the velocity on the same arc that is at most so fast, m/s."""
+        if abs(self.speed) <= top:
+            return self
+        share = top / abs(self.speed)
+        return Velocity(self.speed * share, self.turn * share)
+
 
 @dataclass(frozen=True)
 class Guidance:
