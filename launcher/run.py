@@ -22,7 +22,7 @@ from strict_files.files import FileError
 from surveillance_runtime import node_table, parameter_checks
 from surveillance_runtime.command_line import CommandParser, page_address
 from surveillance_runtime.discovery import LAST_DOMAIN
-from surveillance_runtime.node_table import BY_NAME
+from surveillance_runtime.node_table import RESERVED
 from surveillance_runtime.run_options import (
     BUILT_IN_ROBOT,
     KINEMATIC,
@@ -297,7 +297,7 @@ class Run:
             from floor_plans import read_place  # needs a set-up
 
             try:
-                read_place(self.place, reserved=BY_NAME)
+                read_place(self.place, reserved=RESERVED)
             except FileError as error:
                 raise ValueError(f'--map {error}') from None
         if self.stage is not None:

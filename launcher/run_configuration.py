@@ -27,7 +27,7 @@ from surveillance_runtime.profile import (
     read_profile,
     unmonitored_entries,
 )
-from surveillance_runtime.run_files import RECORDING, TRUTH
+from surveillance_runtime.run_files import ARMOR_STORE, RECORDING, TRUTH
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
     alarm_entries,
@@ -44,7 +44,6 @@ from surveillance_runtime.run_parameters import (
 )
 
 ONTOLOGIES = 'ontologies'
-STORE = 'armor_store'
 
 
 def configuration(
@@ -133,7 +132,7 @@ def _unmonitored(config: Path, run: Run) -> Iterator[Entry]:
 
 def _folders_of(folder: Path) -> Iterator[Entry]:
     """Yield where the nodes of a run write, if the user's file names no other place."""
-    for name, part in (('ontologies_folder', ONTOLOGIES), ('store', STORE)):
+    for name, part in (('ontologies_folder', ONTOLOGIES), ('store', ARMOR_STORE)):
         yield for_node('armor_server', name, str(folder / part), 'this run')
     for node in (
         'battery_controller',

@@ -134,6 +134,28 @@ def latest(runs: Path) -> Found | None:
     return next((each for each in found if each is not None), None)
 
 
+def damaged(runs: Path, found: Found | None) -> str:
+    """Return which run cannot be gone on with, since its `run.json` is damaged; empty: none.
+
+    Args:
+        runs: The folder of the runs.
+        found: The run that was started last, as far as is known; only later ones are named.
+    """
+    since = _changed(found.folder) if found is not None else 0.0
+    for folder in reversed(in_order(_folders(runs))):
+        if _changed(folder) > since and look_into(folder) is None:
+            return f'{folder / STATE} is damaged: that run is not gone on with'
+    return ''
+
+
+def _changed(folder: Path) -> float:
+    """Return when a folder's `run.json` was written, seconds since 1970; 0: it has none."""
+    try:
+        return os.lstat(folder / STATE).st_mtime
+    except OSError:
+        return 0.0
+
+
 def find(runs: Path, name: str) -> Found:
     """Return the run of a name (or path), or the one that was started last where the name is empty.
 

@@ -39,7 +39,7 @@ from surveillance_runtime.configuration import Entry
 from surveillance_runtime.event_log import record_in
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.profile import remappings
-from surveillance_runtime.run_files import LAUNCH_LOG, PLACE, TIMELINE
+from surveillance_runtime.run_files import LAUNCH_LOG, PARAMETERS, PLACE, TIMELINE
 from surveillance_runtime.run_parameters import (
     BEHAVIOUR_NODE,
     full_name,
@@ -98,7 +98,7 @@ def run_mission(
         own.mkdir(exist_ok=True)
         given = (*part.entries, *(job.entries(own) if job is not None else ()))
         merged = configuration(config, part.run, own, fleet=given)
-        files = write_parameters(own / 'parameters', part.run.namespace, merged, part.everyone)
+        files = write_parameters(own / PARAMETERS, part.run.namespace, merged, part.everyone)
         names = [node.name for node in part.nodes]
         of_robot = profile_of(config, part.run).profile
         renamed = (*part.renamed, *remappings(of_robot, names, mode))
@@ -220,7 +220,9 @@ def chosen_folder(run: Run, runs: Path, resume: Path | None) -> tuple[Path, str]
         how = f'was started with other options ({differing}) and is not finished'
         left = f'{_short(found.folder)} {how}'
         return run_folder.make_folder(runs), f'{left}; --resume continues it'
-    return run_folder.make_folder(runs), ''
+    # A run that was told to end is not missed.
+    how = '' if run.fresh or (found and found.running) else run_folder.damaged(runs, found)
+    return run_folder.make_folder(runs), how
 
 
 def _differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
@@ -292,7 +294,9 @@ def summary(record: Path) -> str:
     if not record.exists():
         return NOTHING_RECORDED
     try:
-        return str(mission_log.summarize(event_log.read(record)))
+        left_out = event_log.UnreadLines()
+        text = str(mission_log.summary_in(record, left_out))
+        return f'{text}\n  {left_out.words()}' if left_out.damaged else text
     except FileError as error:
         return f'Mission: {error}'
 

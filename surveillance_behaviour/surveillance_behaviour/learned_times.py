@@ -32,11 +32,10 @@ from patrol_policy.situation import Decision
 from strict_files.files import FileError, KeptFile
 from surveillance_behaviour.charge_estimate import ChargeEstimate
 from surveillance_behaviour.mission.mission_log import (
-    account_of,
+    account_in,
     is_other_simulation,
     on_present_clock,
 )
-from surveillance_runtime.event_log import read
 
 SIMULTANEOUS = 1.0
 """Seconds by which what several threads take for the present may differ."""
@@ -416,7 +415,7 @@ class LearnedTimes:
         learned.problem = learned.file.read(learned._take) or learned.left_out
         if record and Path(record).is_file():
             try:
-                account = account_of(read(record))
+                account = account_in(record)
             except FileError as error:
                 learned.problem = str(error)
                 return learned

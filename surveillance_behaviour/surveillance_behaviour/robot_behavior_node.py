@@ -184,6 +184,8 @@ class RobotBehavior(PatrolNode):
             self.get_logger().warn(
                 f'the earlier run is not continued, a new one begins: {record.problem}'
             )
+        elif record.left_out.damaged:
+            self.get_logger().warn(record.left_out.words())
         return record
 
 

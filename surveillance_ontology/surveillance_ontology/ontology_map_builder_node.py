@@ -29,7 +29,8 @@ from floor_plans.parameters import (
     stations_in,
     zones_from,
 )
-from strict_files.files import in_one_line, replace_text
+from strict_files.files import in_one_line, read_json, replace_text
+from strict_files.yaml_file import MAX_BYTES
 from surveillance_interfaces.msg import FactChanges, OntologyMap
 from surveillance_interfaces.srv import (
     AddRoom,
@@ -309,7 +310,7 @@ class OntologyMapBuilder(PatrolNode):
         if self._place_file is None or not self._place_file.exists():
             return
         try:
-            kept = json.loads(self._place_file.read_text('utf-8'))
+            kept = read_json(self._place_file, MAX_BYTES)
             if kept['described'] == self._given:
                 self._stations = stations_in(described_in_text(kept['text']))
                 self._tell_place(kept['text'])

@@ -31,6 +31,7 @@ from rclpy.qos import qos_profile_parameter_events
 
 from state_machines.ros.waiting import reported
 from strict_files.files import FileError
+from strict_files.one_line import clean
 from strict_files.settings import parameter
 from strict_files.suggestions import nearest
 from surveillance_interfaces.srv import ConsoleCommand
@@ -42,7 +43,6 @@ from surveillance_runtime.incidents import IncidentCall, IncidentUpdate, Severit
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.logging import Allowance
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.one_line import clean
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.process import run_node
 from surveillance_runtime.state_topics import publishers_of

@@ -15,6 +15,7 @@ from typing import Any, TextIO
 
 from std_msgs.msg import String
 
+from strict_files.one_line import clean
 from strict_files.suggestions import nearest
 from surveillance_controllers.manual.prompt import Console
 from surveillance_operator.console_commands import (
@@ -35,7 +36,6 @@ from surveillance_operator.mission_words import why as reason
 from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
-from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 from surveillance_runtime.qos import STATE_QOS
 

@@ -7,7 +7,6 @@ counts (`DayBook`), its pictures, and what people were called for.
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping, Sequence
 from datetime import date, datetime, timedelta
 from html import escape
@@ -20,10 +19,12 @@ from indoor_watch import Event, EventState
 from indoor_watch.day_book import DayBook, Seen
 from indoor_watch.privacy import PictureError, shareable
 from strict_files.files import FileError, read_file, replace_text
+from strict_files.regular_files import parse_json
 from surveillance_operator.run_entries import PastIncident, entries_of_run, incidents_of
 from surveillance_perception.finding_teller import findings_of
+from surveillance_runtime.run_files import EVIDENCE
 
-OBSERVER, EVIDENCE = 'observer.json', 'evidence'
+OBSERVER = 'observer.json'
 MOST_BYTES = 200_000_000
 MOST_PICTURES = 60
 ALERT = 3
@@ -60,11 +61,11 @@ def write_day(folder: Path, day: str, *, blur: bool = True) -> Path:
     if not path.exists():
         raise FileError(f'{folder}: nothing was watched, expected a run with --watch')
     try:
-        kept = json.loads(read_file(path, MOST_BYTES))
+        kept = parse_json(read_file(path, MOST_BYTES))
         book = DayBook(datetime.fromtimestamp)
         book.restore(kept.get('days', {}))
         events = _findings(folder, kept['book']['events'])
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError) as error:
         raise FileError(f'{path}: cannot be read: {error!s:.100}') from None
     newest = book.days()[-1] if book.days() else date.today().isoformat()
     wanted = newest if day == NEWEST else day

@@ -31,7 +31,7 @@ from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_runtime import event_log
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.event_log import record_in
-from surveillance_runtime.node_table import BY_NAME
+from surveillance_runtime.node_table import RESERVED
 from surveillance_simulation.world.textures import marker_panel
 
 Spot = tuple[float, float]
@@ -210,7 +210,7 @@ def _positive(text: str) -> float:
 
 
 def _draw(options: argparse.Namespace) -> list[str]:
-    file = read_place(options.place, reserved=BY_NAME)
+    file = read_place(options.place, reserved=RESERVED)
     plan = file.plan
     try:
         checked_names(plan.place)

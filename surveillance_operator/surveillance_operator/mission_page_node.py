@@ -26,6 +26,7 @@ from floor_plans.writing import copy_place
 from lidar_navigation.robot_base import robot_radius
 from state_machines.exceptions import CallError
 from strict_files.files import FileError
+from strict_files.one_line import clean
 from strict_files.regular_files import read_file
 from strict_files.settings import parameter
 from strict_files.suggestions import nearest
@@ -49,7 +50,6 @@ from surveillance_runtime.launch_protocol import FOR_THE_TERMINAL, HEARTBEAT, No
 from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
-from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 
 POLL_PERIOD = 0.015

@@ -14,6 +14,7 @@ from typing import Any
 from rich.console import Console
 
 from state_machines.exceptions import CallError
+from strict_files.one_line import clean
 from surveillance_operator.fleet_actions import ALL
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.mission_state import MissionState, Notice
@@ -21,7 +22,6 @@ from surveillance_operator.stop_button import StopButton
 from surveillance_operator.watch.view import show_moving, show_once
 from surveillance_runtime.logging import print_lines
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.one_line import clean
 from surveillance_runtime.process import run_node
 
 POLL_PERIOD = 0.1

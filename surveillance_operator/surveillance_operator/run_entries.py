@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
-from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from floor_plans.facts import counted
-from strict_files.files import FileError
+from strict_files.files import FileError, read_file
+from strict_files.regular_files import parse_json
+from surveillance_behaviour.mission.mission_log import account_of
 from surveillance_runtime.event_log import (
+    LARGEST,
     RecordEntry,
+    UnreadLines,
     on_one_clock,
     read,
     read_all,
@@ -31,11 +32,11 @@ class RunEntries:
 
     Attributes:
         entries: On one clock, so that what lies between two of them is how long it took.
-        passed: How many lines of which kind were passed over.
+        left_out: What of the log is damaged, or of a later version.
     """
 
     entries: list[RecordEntry]
-    passed: Mapping[str, int]
+    left_out: UnreadLines
 
     @property
     def of_mission(self) -> list[RecordEntry]:
@@ -44,11 +45,7 @@ class RunEntries:
 
     def problem(self) -> str:
         """Return what is not in it; empty: nothing."""
-        if not self.passed:
-            return ''
-        kinds = ', '.join(f'{name} {count}' for name, count in sorted(self.passed.items()))
-        lines = counted(sum(self.passed.values()), 'line')
-        return f'{lines} of the record passed over, which this version does not know: {kinds}'
+        return self.left_out.words()
 
 
 def entries_of_run(folder: Path, *, whole: bool = False) -> RunEntries:
@@ -61,28 +58,33 @@ def entries_of_run(folder: Path, *, whole: bool = False) -> RunEntries:
     Raises:
         FileError: There is no log, or it cannot be read.
     """
-    path, passed = record_in(folder), Counter[str]()
-    old = list(_old_incidents(folder / OLD_INCIDENTS, passed))
+    path, left_out = record_in(folder), UnreadLines()
+    old = list(_old_incidents(folder / OLD_INCIDENTS, left_out))
     found: list[RecordEntry] = []
     if path.exists() or not old:
-        found = list(read_all(path, passed)) if whole else read(path, passed)
-    return RunEntries([*old, *on_one_clock(found)], passed)
+        found = list(read_all(path, left_out)) if whole else read(path, left_out)
+        try:
+            account_of(found[:1])  # a snapshot
+        except FileError as error:
+            left_out.damaged.append(f'{path}: {error}')
+            found = list(read_all(path, left_out))
+    return RunEntries([*old, *on_one_clock(found)], left_out)
 
 
-def _old_incidents(path: Path, passed: Counter[str]) -> Iterator[RecordEntry]:
+def _old_incidents(path: Path, left_out: UnreadLines) -> Iterator[RecordEntry]:
     """Give the incidents of a run of an earlier version, whose clock the log does not share."""
     try:
-        lines = path.read_bytes().splitlines()
-    except OSError:
+        lines = read_file(path, LARGEST).split(b'\n')
+    except FileError:
         return
-    for number, line in enumerate(lines):
+    for number, line in enumerate(each for each in lines if each.strip()):
         try:
-            told = json.loads(line)
+            told = parse_json(line)
             at, lasted = float(told['at']), told['seconds']
             fields = {key: str(told[key]) for key in ('kind', 'name', 'severity', 'text')}
             fields['node'] = str(told.get('node', ''))
-        except (ValueError, KeyError, TypeError):
-            passed['incident'] += 1
+        except (ValueError, KeyError, TypeError, OverflowError):
+            left_out.damaged.append(f'{path}:{number + 1}: expected an incident')
             continue
         phase = 'begin' if lasted is None else 'end'
         more = {'id': f'{fields["node"]} {fields["kind"]} {fields["name"]}', 'phase': phase}

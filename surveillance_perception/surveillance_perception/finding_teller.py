@@ -14,7 +14,7 @@ from typing import Any
 
 from indoor_watch import Event, EventState, Observation
 from strict_files.files import FileError
-from surveillance_runtime.event_log import EventLog, RecordEntry, read_intact
+from surveillance_runtime.event_log import EventLog, RecordEntry, read_newest
 from surveillance_runtime.incidents import Cause, Incidents, SeenThing, Severity
 
 KIND = 'event'
@@ -139,7 +139,7 @@ class FindingTeller:
         """
         by_number = {each['number']: each for each in kept['events']}
         if self._log is not None:
-            past = findings_of(read_intact(self._log.path))
+            past = findings_of(read_newest(self._log.path))
             by_number = {number: each.to_json() for number, each in past.items()} | by_number
         return {**kept, 'events': list(by_number.values())}
 

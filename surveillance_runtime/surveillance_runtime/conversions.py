@@ -22,7 +22,7 @@ from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 from sensor_msgs.msg import BatteryState, PointCloud2, PointField
 
-from surveillance_runtime.one_line import without_controls
+from strict_files.one_line import without_controls
 from surveillance_runtime.robot_arm import TrajectoryPoint
 
 if TYPE_CHECKING:

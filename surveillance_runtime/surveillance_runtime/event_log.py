@@ -42,14 +42,16 @@ import gzip
 import json
 import math
 import os
+import secrets
 import shutil
+import struct
 import threading
 import time
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -277,6 +279,8 @@ class EventLog:
         self._boot = _boot()
         self._can_reserve = True
         self._has_told_of_gap = False
+        # Others append to the same file: whose gap it is.
+        self._writer = secrets.token_hex(4)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             files.file_to_write(self.path)
@@ -338,7 +342,10 @@ class EventLog:
         lines = self._waiting
         if self._has_told_of_gap:
             why = 'some of what waited is lost' if self._lost else 'what waited is written'
-            lines += line_of(self.entry('gap', phase='end', why=why, lost=bool(self._lost)))
+            end = self.entry(
+                'gap', phase='end', why=why, lost=bool(self._lost), writer=self._writer
+            )
+            lines += line_of(end)
         try:
             size = self._append(lines, patience)
         except OSError as error:
@@ -392,7 +399,8 @@ class EventLog:
             return
         full = os.strerror(errno.ENOSPC)
         if not self._has_told_of_gap:
-            line = line_of(self.entry('gap', phase='begin', why=full))
+            begin = self.entry('gap', phase='begin', why=full, writer=self._writer)
+            line = line_of(begin)
             with contextlib.suppress(OSError):
                 if left >= len(line) and os.write(descriptor, line) == len(line):
                     self._has_told_of_gap = True
@@ -561,59 +569,98 @@ def check(name: str, fields: Mapping[str, object], where: str) -> None:
             raise FileError(f'{where}: event {name!r}: {key} is {shown!r}, expected a number')
 
 
-def read(path: str | Path, passed: Counter[str] | None = None) -> list[RecordEntry]:
+@dataclass
+class UnreadLines:
+    """What of a log was not read.
+
+    Attributes:
+        unknown: How many lines of which kind are of a later version.
+        damaged: One line about each finished line that is no entry, and each file that cannot be
+            unpacked, with its name.
+    """
+
+    unknown: Counter[str] = field(default_factory=Counter)
+    damaged: list[str] = field(default_factory=list)
+
+    def words(self) -> str:
+        """Return it in one line; empty: nothing was left out."""
+        parts = []
+        if self.damaged:
+            more = f' and {len(self.damaged) - 1} more' if len(self.damaged) > 1 else ''
+            parts.append(f'{self.damaged[0]}{more}: left out')
+        if self.unknown:
+            kinds = ', '.join(f'{name} {count}' for name, count in sorted(self.unknown.items()))
+            total = sum(self.unknown.values())
+            lines = '1 line' if total == 1 else f'{total} lines'
+            parts.append(
+                f'{lines} of the record passed over, which this version does not know: {kinds}'
+            )
+        return '; '.join(parts)
+
+
+def read(path: str | Path, left_out: UnreadLines | None = None) -> list[RecordEntry]:
     """Read the last file of a log, without an unfinished last line.
+
+    A line that is damaged costs none of the others: a mission goes on with what is left.
 
     Args:
         path: The file.
-        passed: Gets how many lines of which kind are passed over: of kinds that are not known, and
-            of others' than the mission's that lack a field.
+        left_out: Gets what is not read.
 
     Raises:
-        FileError: The file cannot be read, or a finished line is not an entry.
+        FileError: The file cannot be read.
     """
+    found = _last_file(path, left_out)
+    packed = segments(Path(path))
+    if packed and not any(entry.name == 'snapshot' for entry in found[:1]):
+        # What was counted until then is damaged: it is counted again.
+        found = [*_unpacked(packed, left_out), *found]
+    return found
+
+
+def _last_file(path: str | Path, left_out: UnreadLines | None) -> list[RecordEntry]:
     try:
         content = read_file(Path(path), LARGEST)
     except FileError as error:
         raise FileError(f'cannot read the mission record {error}') from None
-    return list(entries_of(content, f'{path}', passed))
+    return list(entries_of(content, f'{path}', left_out))
 
 
-def read_all(path: str | Path, passed: Counter[str] | None = None) -> Iterator[RecordEntry]:
+def read_all(path: str | Path, left_out: UnreadLines | None = None) -> Iterator[RecordEntry]:
     """Give every entry of a log, those that were packed away too, one file at a time.
 
     Raises:
-        FileError: A file cannot be read, or a finished line is not an entry.
+        FileError: Its last file cannot be read.
     """
-    for packed in segments(Path(path)):
-        content = _unpacked(packed)
-        yield from (e for e in entries_of(content, f'{packed}', passed) if e.name != 'snapshot')
-    yield from (entry for entry in read(path, passed) if entry.name != 'snapshot')
+    yield from _unpacked(segments(Path(path)), left_out)
+    yield from (each for each in _last_file(path, left_out) if each.name != 'snapshot')
 
 
-def read_intact(path: str | Path, packed: int | None = None) -> Iterator[RecordEntry]:
-    """Give what is left of a log: a damaged line or file costs none of the others.
-
-    For what is better known in part than not at all; a mission is not gone on with by that.
+def read_newest(path: str | Path, packed: int | None = None) -> Iterator[RecordEntry]:
+    """Give the newest entries of a log, nothing where its last file cannot be read.
 
     Args:
         path: The file.
-        packed: How many of the files that were packed away are read, the newest; None: all.
+        packed: How many of the files that were packed away are read as well; None: all.
     """
-    last = Path(path)
-    older = segments(last)
-    for each in [*older[len(older) - packed if packed is not None else 0 :], last]:
-        with contextlib.suppress(FileError):
-            content = read_file(last, LARGEST) if each is last else _unpacked(each)
-            intact = entries_of(content, f'{each}', is_whole=False)
-            yield from (entry for entry in intact if entry.name != 'snapshot')
+    older = segments(Path(path))
+    yield from _unpacked(older if packed is None else older[max(0, len(older) - packed) :], None)
+    with contextlib.suppress(FileError):
+        yield from (each for each in _last_file(path, None) if each.name != 'snapshot')
 
 
-def _unpacked(packed: Path) -> bytes:
-    try:
-        return gzip.decompress(packed.read_bytes())
-    except (OSError, EOFError, zlib.error) as error:
-        raise FileError(f'cannot read the mission record {packed}: {error}') from None
+def _unpacked(files: Sequence[Path], left_out: UnreadLines | None) -> Iterator[RecordEntry]:
+    for packed in files:
+        try:
+            with gzip.open(packed) as file:
+                content = file.read(LARGEST)
+        except (OSError, EOFError, zlib.error, struct.error) as error:
+            if left_out is not None:
+                left_out.damaged.append(f'{packed}: cannot be unpacked: {error}')
+            continue
+        for entry in entries_of(content, f'{packed}', left_out):
+            if entry.name != 'snapshot':
+                yield entry
 
 
 def segments(path: Path) -> list[Path]:
@@ -622,28 +669,24 @@ def segments(path: Path) -> list[Path]:
 
 
 def entries_of(
-    content: bytes, where: str, passed: Counter[str] | None = None, *, is_whole: bool = True
+    content: bytes, where: str, left_out: UnreadLines | None = None
 ) -> Iterator[RecordEntry]:
     """Give the entries of a file's content, see `read`.
 
     Args:
         content: Of the file.
-        where: How the file is called in errors.
-        passed: See `read`.
-        is_whole: Whether each finished line is to be an entry; else one that is none is left out.
-
-    Raises:
-        FileError: A finished line is not an entry.
+        where: How the file is called.
+        left_out: See `read`.
     """
     before, boot = 0.0, ''
     for number, line in enumerate(content.split(b'\n')[:-1], start=1):
         if not line.strip():
             continue
         try:
-            entry = _entry_of(line, f'{where}:{number}', before, passed)
-        except FileError:
-            if is_whole:
-                raise
+            entry = _entry_of(line, f'{where}:{number}', before, left_out)
+        except FileError as error:
+            if left_out is not None:
+                left_out.damaged.append(str(error))
             continue
         if entry is not None:
             before, boot = entry.time, entry.boot or boot
@@ -651,7 +694,7 @@ def entries_of(
 
 
 def _entry_of(
-    line: bytes, where: str, before: float, passed: Counter[str] | None
+    line: bytes, where: str, before: float, left_out: UnreadLines | None
 ) -> RecordEntry | None:
     try:
         values = parse_json(line)
@@ -672,13 +715,13 @@ def _entry_of(
         if kind is not None:
             check(name, values, where)
     except FileError:
-        # What the mission is gone on with must be whole; the rest is told without that line.
+        # A later version may have other fields; what the mission is gone on with has these.
         if kind is None or kind.is_of_mission:
             raise
         kind = None
     if kind is None:
-        if passed is not None:
-            passed[name] += 1
+        if left_out is not None:
+            left_out.unknown[name] += 1
         return None
     return RecordEntry(name, time, values, at, steady, boot)
 
@@ -709,22 +752,28 @@ class MissingTime(NamedTuple):
 def gaps(entries: Iterable[RecordEntry]) -> list[MissingTime]:
     """Return the times of which something is missing, since the disk was full."""
     found: list[MissingTime] = []
-    begun: RecordEntry | None = None
+    # Of each writer that has not ended its own: where it began, and the start of a mission since.
+    open_ones: dict[str, tuple[float, float | None]] = {}
+    last = 0.0
     for entry in entries:
-        is_end = entry.name == 'gap' and entry.text('phase') == 'end'
-        if is_end and begun is not None:
+        last = entry.time
+        if entry.name == 'start':
+            open_ones = {
+                writer: (begin, entry.time if end is None else end)
+                for writer, (begin, end) in open_ones.items()
+            }
+        if entry.name != 'gap':
+            continue
+        writer = str(entry.fields.get('writer', ''))
+        if entry.text('phase') != 'end':
+            open_ones.setdefault(writer, (entry.time, None))
+        elif writer in open_ones:
+            begin, _ = open_ones.pop(writer)
             if entry.fields.get('lost'):
-                found.append(MissingTime(begun.time, entry.time))
-            begun = None
-        elif entry.name == 'gap':
-            begun = entry
-        elif entry.name == 'start' and begun is not None:
-            # Whoever wrote it ended before there was space.
-            found.append(MissingTime(begun.time, entry.time))
-            begun = None
-    if begun is not None:
-        found.append(MissingTime(begun.time, entry.time))
-    return found
+                found.append(MissingTime(begin, entry.time))
+    # Whoever wrote these ended before there was space.
+    found += [MissingTime(begin, last if end is None else end) for begin, end in open_ones.values()]
+    return sorted(found)
 
 
 # --- clocks ---

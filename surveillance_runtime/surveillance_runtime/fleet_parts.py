@@ -104,7 +104,7 @@ def members(path: Path, robots: int | None, reach: float) -> tuple[FleetMember, 
     Raises:
         ValueError: The place has another number of robots, or no room for so many.
     """
-    place = read_place(path, radius=reach, reserved=node_table.BY_NAME)
+    place = read_place(path, radius=reach, reserved=node_table.RESERVED)
     if robots is None or len(place.robots) == robots:
         return place.robots
     if place.robots:
@@ -133,7 +133,7 @@ def team_parts(
     names = [SHARED, *(member.name for member in fleet)]
     for word in (*choice.only, *choice.without):
         _check_word(word, names)
-    place = read_place(path, radius=reach, reserved=node_table.BY_NAME)
+    place = read_place(path, radius=reach, reserved=node_table.RESERVED)
     moved = points_to_pass(place.plan, reach)
     plan = with_points(place.plan, moved)
     shared_by_all: list[tuple[str, object]] = [

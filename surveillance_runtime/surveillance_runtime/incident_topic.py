@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
+from strict_files.one_line import clean
 from surveillance_interfaces.msg import Incident as IncidentMessage
 from surveillance_interfaces.msg import IncidentFinding
 from surveillance_runtime.conversions import seconds_of, stamp_from
@@ -27,7 +28,6 @@ from surveillance_runtime.incidents import (
     Severity,
 )
 from surveillance_runtime.message_source import SOURCE
-from surveillance_runtime.one_line import clean
 
 if TYPE_CHECKING:
     from surveillance_runtime.node import PatrolNode
@@ -138,9 +138,9 @@ def message_from(told: IncidentUpdate, now: float) -> IncidentMessage:
         message.finding = [
             IncidentFinding(
                 number=seen.number,
-                kind=seen.kind,
-                seen=seen.seen,
-                subject=seen.subject,
+                kind=clean(seen.kind),
+                seen=clean(seen.seen),
+                subject=clean(seen.subject),
                 has_position=seen.position is not None,
                 x=float(x),
                 y=float(y),

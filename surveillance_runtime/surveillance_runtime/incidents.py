@@ -13,6 +13,7 @@ end.
 from __future__ import annotations
 
 import json
+import math
 import threading
 import time
 import uuid
@@ -96,6 +97,9 @@ class SeenThing:
         )
 
 
+_TEXTS = ('text', 'id', 'robot', 'node', 'place', 'action', 'acknowledged_by')
+
+
 @dataclass(frozen=True)
 class IncidentUpdate:
     """An incident as its owner tells of it: it begins, it changes, or it is over.
@@ -157,6 +161,11 @@ class IncidentUpdate:
             ValueError, KeyError, TypeError, IndexError: It is something else.
         """
         given = dict(values)
+        given['since'] = float(given.get('since', 0.0))
+        if not math.isfinite(given['since']):
+            raise ValueError(f'since {given["since"]}: expected a time')
+        for key in _TEXTS:
+            given[key] = str(given.get(key, ''))
         kind, name = given['cause']
         given['cause'] = Cause(str(kind), str(name))
         given['phase'], given['severity'] = (
@@ -181,7 +190,7 @@ class IncidentUpdate:
         """
         try:
             return cls.from_json(json.loads(line))
-        except (LookupError, TypeError, AttributeError) as error:
+        except (LookupError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f'expected an incident, got {line[:60]!r}') from error
 
 

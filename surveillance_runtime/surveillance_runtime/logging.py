@@ -20,7 +20,7 @@ from typing import Any
 import rclpy.impl.rcutils_logger as rcutils
 from rclpy.logging import LoggingSeverity, get_logger_effective_level, set_logger_level
 
-from surveillance_runtime.one_line import clean
+from strict_files.one_line import clean
 
 LINES_PER_SECOND, LINES_AT_ONCE = 7.0, 40.0
 """Lines of a node for each second in the long run, and after a pause."""

@@ -41,6 +41,7 @@ from rclpy.timer import Timer
 
 from state_machines import Interrupt
 from state_machines.ros.waiting import CLIENT_QOS, SERVICE_QOS
+from strict_files.one_line import clean
 from surveillance_runtime.configuration import (
     Configuration,
     RosArguments,
@@ -51,7 +52,6 @@ from surveillance_runtime.health import Health
 from surveillance_runtime.incident_topic import IncidentPublisher
 from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
 from surveillance_runtime.logging import CleanLogger
-from surveillance_runtime.one_line import clean
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
 
 if TYPE_CHECKING:

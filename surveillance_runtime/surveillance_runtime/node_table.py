@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from strict_files.suggestions import nearest
+from surveillance_runtime.run_files import FOLDERS
 
 MODES = ('SIMULATED', 'ROBOT', 'RANDOM', 'MANUAL')
 DEFAULT_MODE = 'SIMULATED'
@@ -89,6 +90,8 @@ NODES = tuple(
     for name, purpose in purposes.items()
 )
 BY_NAME = {node.name: node for node in NODES}
+RESERVED = FOLDERS.union(BY_NAME)
+"""What no robot of a fleet may be called: programs, and folders of a run."""
 
 # What the first decision waits for comes first, so that it is ready first: the map, and the place
 # that the robot is in, which takes the base's laser.

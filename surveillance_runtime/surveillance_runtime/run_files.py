@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -14,6 +15,26 @@ RECORDING, TIMELINE, LAUNCH_LOG = 'recording', 'timeline.jsonl', 'launch.log'
 programs."""
 STATE = 'run.json'
 """What a run was asked for, whether it ended, and its number."""
+
+
+PARAMETERS, EVIDENCE, OUTBOX, ARMOR_STORE = 'parameters', 'evidence', 'outbox', 'armor_store'
+"""Folders of a run: of its nodes, the observer, the node `alarm`, the ontology's server."""
+FOLDERS = frozenset({RECORDING, PARAMETERS, EVIDENCE, OUTBOX, ARMOR_STORE})
+"""The folders of a run that are no robot's; no robot of a fleet may be called so."""
+
+
+_A_ROBOT = re.compile('[A-Za-z0-9_]{1,200}')
+
+
+def folder_of(run: Path, robot: str) -> Path:
+    """Return the folder of a robot in that of its run; that of the run where it has none.
+
+    Args:
+        run: The run's folder.
+        robot: What somebody calls it: anybody may tell of something in any name, it is no path.
+    """
+    own = run / robot if _A_ROBOT.fullmatch(robot) and robot not in FOLDERS else run
+    return own if own.is_dir() else run
 
 
 def run_number(folder: Path) -> int:

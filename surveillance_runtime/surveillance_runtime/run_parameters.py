@@ -24,7 +24,7 @@ from surveillance_runtime.configuration import (
 )
 from surveillance_runtime.node_table import ALARM, NODES, Node
 from surveillance_runtime.profile import ProfileFile, profile_layer
-from surveillance_runtime.run_files import PLACE
+from surveillance_runtime.run_files import EVIDENCE, PLACE
 from surveillance_runtime.run_options import MUJOCO
 
 BEHAVIOUR_NODE = 'robot_behavior'
@@ -196,7 +196,7 @@ def watch_entries(folder: Path, file: Path) -> Iterator[Entry]:
     kept = folder.resolve()
     yield for_node(OBSERVER, 'state_file', str(kept / f'{OBSERVER}.json'), 'this run')
     for node in (OBSERVER, PAGE):
-        yield for_node(node, 'evidence_folder', str(kept / 'evidence'), 'this run')
+        yield for_node(node, 'evidence_folder', str(kept / EVIDENCE), 'this run')
 
 
 def stage_entry(file: Path) -> Entry:

@@ -23,9 +23,16 @@ from surveillance_behaviour.mission.mission_log import (
     account_of,
     cut_off,
     summarize,
+    summary_in,
 )
 from surveillance_runtime import event_log
-from surveillance_runtime.event_log import Clocks, on_one_clock, read, read_all
+from surveillance_runtime.event_log import (
+    Clocks,
+    UnreadLines,
+    on_one_clock,
+    read,
+    read_all,
+)
 
 
 @pytest.fixture
@@ -91,12 +98,10 @@ def test_a_torn_last_line_is_skipped_and_then_cut_off(path: Path, kept: int) -> 
 def test_a_broken_line_is_named(path: Path, line: str) -> None:
     path.parent.mkdir()
     path.write_text(f'{{"event": "end", "time": 1}}\n{line}\n')
-    shown = re.escape(line[:60])
-    with pytest.raises(FileError, match=rf'events\.jsonl:2: expected a JSON object .*{shown}'):
-        read(path)
-    path.write_text('{"event": "visit", "time": 1, "place": "E"}\n')
-    with pytest.raises(FileError, match=r"jsonl:1: event 'visit' lacks distance"):
-        read(path)
+    shown, unread = re.escape(line[:60]), UnreadLines()
+    assert [each.name for each in read(path, unread)] == ['end']
+    (told,) = unread.damaged
+    assert re.search(rf'events\.jsonl:2: expected a JSON object .*{shown}', told)
 
 
 def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
@@ -339,10 +344,25 @@ def test_a_snapshot_whose_numbers_are_none_is_named(path: Path, where: str, valu
 def test_a_number_that_is_none_is_named_and_a_mission_goes_on(path: Path, value: str) -> None:
     path.parent.mkdir()
     path.write_text(f'{{"event": "visit", "time": 1, "place": "E", "distance": {value}}}\n')
-    with pytest.raises(FileError, match=r"jsonl:1: event 'visit': distance is .* a number"):
-        read(path)
     with MissionRecord(path) as record:
+        assert "jsonl:1: event 'visit': distance is" in record.left_out.words()
         record.write('visit', 2.0, place='E', distance=0.0)
+    assert summarize(read(path)).visits == {'E': 1}
+
+
+@pytest.mark.parametrize('how', ['gone', 'no account'])
+def test_what_a_damaged_snapshot_counted_is_counted_again(path: Path, how: str) -> None:
+    with MissionRecord(path, segment_bytes=3000) as record:
+        for turn in range(100):
+            record.write('visit', 2.0 * turn, place='C1', distance=1.5)
+    first, _, rest = path.read_bytes().partition(b'\n')
+    first = b'{' if how == 'gone' else first.replace(b'"left_at"', b'"left"')
+    path.write_bytes(first + b'\n' + rest)
+    with MissionRecord(path) as again:
+        assert again.left_at is not None
+        assert str(path) in again.left_out.words()
+        again.write('visit', 300.0, place='C1', distance=1.5)
+    assert summary_in(path).visits == {'C1': 101}
 
 
 def test_an_empty_record_says_so(path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from surveillance_operator.notify.notification import Notification, notification_of
@@ -25,4 +26,4 @@ def test_a_notification_of_a_finding_has_its_pictures_and_one_key_for_one_call(
     assert sent.pictures == (str(tmp_path / '3_1_a.jpg'), str(tmp_path / '3_2_b.jpg'))
     assert sent.key == notification_of(call, 'Robot1', 1200.0, tmp_path).key
     assert sent.key != notification_of(call._replace(number=2), 'Robot1', 1000.0, tmp_path).key
-    assert Notification.from_kept(sent.kept()) == sent
+    assert Notification.from_kept(json.loads(sent.kept())) == sent

@@ -17,7 +17,16 @@ import pytest
 from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
 from surveillance_runtime import event_log
-from surveillance_runtime.event_log import KINDS, EventLog, check, gaps, read, read_all
+from surveillance_runtime.event_log import (
+    KINDS,
+    EventLog,
+    RecordEntry,
+    UnreadLines,
+    check,
+    gaps,
+    read,
+    read_all,
+)
 
 pytestmark = pytest.mark.unit
 
@@ -42,19 +51,34 @@ def test_a_line_that_is_not_known_is_passed_over_and_counted(
     path: Path, line: dict[str, object]
 ) -> None:
     path.write_text(f'{json.dumps(VISIT)}\n{json.dumps(line)}\n{json.dumps(VISIT)}\n')
-    passed: Counter[str] = Counter()
-    assert [each.name for each in read(path, passed)] == ['visit', 'visit']
-    assert passed == {line['event']: 1}
+    unread = UnreadLines()
+    assert [each.name for each in read(path, unread)] == ['visit', 'visit']
+    assert unread.unknown == {line['event']: 1}
     with MissionRecord(path) as record:
         assert not record.problem
         record.write('visit', 3.0, place='E', distance=1.0)
     assert summarize(read(path)).visits == {'E': 3}
 
 
-def test_a_line_of_the_mission_that_lacks_something_is_named(path: Path) -> None:
-    path.write_text('{"event": "visit", "time": 1.0}\n')
-    with pytest.raises(FileError, match=r"jsonl:1: event 'visit' lacks place, distance"):
-        read(path)
+def test_a_line_of_the_mission_that_lacks_something_is_named_and_left_out(path: Path) -> None:
+    path.write_text(f'{{"event": "visit", "time": 1.0}}\n{json.dumps(VISIT)}\n')
+    unread = UnreadLines()
+    assert [each.time for each in read(path, unread)] == [2.0]
+    (line,) = unread.damaged
+    assert line == f"{path}:1: event 'visit' lacks place, distance"
+    with MissionRecord(path) as record:
+        assert record.is_begun
+
+
+def test_a_gap_is_its_writer_s_own(path: Path) -> None:
+    def gap(time: float, phase: str, writer: str, lost: bool = False) -> RecordEntry:
+        return RecordEntry('gap', time, {'phase': phase, 'writer': writer, 'lost': lost})
+
+    start = RecordEntry('start', 30.0, {})
+    begun = [gap(10.0, 'begin', 'behaviour'), gap(12.0, 'begin', 'alarm')]
+    assert gaps([*begun, gap(20.0, 'end', 'alarm'), start]) == [(10.0, 30.0)]
+    both = [*begun, start, gap(40.0, 'end', 'alarm', lost=True)]
+    assert gaps(both) == [(10.0, 30.0), (12.0, 40.0)]
 
 
 def test_processes_that_append_at_once_lose_no_line_over_many_files(path: Path) -> None:

@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 
 from state_machines.ros import ServiceCaller
 from state_machines.ros.waiting import CLIENT_QOS
+from strict_files.one_line import LONGEST, clean
 from surveillance_runtime.logging import (
     LINES_AT_ONCE,
     LINES_PER_SECOND,
@@ -23,7 +24,6 @@ from surveillance_runtime.logging import (
     Allowance,
 )
 from surveillance_runtime.node import MOST_WAITING, PatrolNode
-from surveillance_runtime.one_line import LONGEST, clean
 from surveillance_runtime.waiting import AwaitedEvent
 
 

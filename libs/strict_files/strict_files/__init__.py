@@ -5,6 +5,7 @@ the one error of them all. Nothing but `yaml_file` needs more than Python itself
 can use the rest before it has installed anything.
 
 Public modules: `files` (errors in one line, bounded reading, three ways to write),
-`regular_files` (the same, with plain OS errors), `settings` (fields of records with bounds),
-`suggestions` (the nearest name of a mistyped one), `yaml_file` (YAML with the line of each key).
+`one_line` (any text as one line), `regular_files` (the same, with plain OS errors), `settings`
+(fields of records with bounds), `suggestions` (the nearest name of a mistyped one),
+`yaml_file` (YAML with the line of each key).
 """

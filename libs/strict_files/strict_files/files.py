@@ -13,11 +13,19 @@ from pathlib import Path
 from typing import Any
 
 from strict_files import regular_files
+from strict_files.one_line import clean
 from strict_files.suggestions import like
 
 
 class FileError(ValueError):
-    """A file cannot be read, written or understood; one line that says which, and often where."""
+    """A file cannot be read, written or understood; one line that says which, and often where.
+
+    What a file holds may be anything: control characters in the line are written as escapes, and
+    one that is very long loses its middle.
+    """
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(clean(problem))
 
 
 def in_one_line(error: OSError) -> str:

@@ -51,9 +51,11 @@ from surveillance_runtime.event_log import (
     Clocks,
     EventLog,
     RecordEntry,
+    UnreadLines,
     clock_step,
     of_mission,
     read,
+    read_all,
 )
 
 
@@ -68,6 +70,7 @@ class MissionRecord:
     Attributes:
         path: The log.
         problem: Why nothing is known of what the log holds already; empty: it is known.
+        left_out: What of it is damaged, or of a later version.
 
     Raises:
         FileError: The log cannot be opened for writing.
@@ -84,8 +87,9 @@ class MissionRecord:
         self._segment_bytes = segment_bytes
         self._account = Account()
         self.problem = ''
+        self.left_out = UnreadLines()
         try:
-            self._account = account_of(read(self.path))
+            self._account = account_in(self.path, self.left_out)
         except FileError as error:
             self.problem = str(error)
 
@@ -392,6 +396,25 @@ def _promise(kept: Any) -> Promise | None:
     return Promise(str(kept['place']), str(kept['verdict']), threshold, wait, str(kept['words']))
 
 
+def account_in(path: str | Path, left_out: UnreadLines | None = None) -> Account:
+    """Count the record in a log.
+
+    Args:
+        path: The log.
+        left_out: Gets what of it is damaged, or of a later version.
+
+    Raises:
+        FileError: It cannot be read.
+    """
+    try:
+        return account_of(read(path, left_out))
+    except FileError as error:
+        if left_out is not None:
+            left_out.damaged.append(f'{path}: {error}')
+        # What a snapshot counted is not what it should be: all is counted again.
+        return account_of(read_all(path, left_out))
+
+
 def account_of(events: Iterable[RecordEntry]) -> Account:
     """Count a record."""
     account = Account()
@@ -408,7 +431,19 @@ def summarize(events: Iterable[RecordEntry]) -> Summary:
     there on count as a mission of their own and their times add up. A machine's clock that is set
     changes neither what it took nor how long a place waited.
     """
-    account = account_of(events)
+    return _summary_of(account_of(events))
+
+
+def summary_in(path: str | Path, left_out: UnreadLines | None = None) -> Summary:
+    """Sum up the record in a log, see `account_in` and `summarize`.
+
+    Raises:
+        FileError: It cannot be read.
+    """
+    return _summary_of(account_in(path, left_out))
+
+
+def _summary_of(account: Account) -> Summary:
     _close_gaps(account.summary, account.last_seen, account.now)
     return account.summary
 

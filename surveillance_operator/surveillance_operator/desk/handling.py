@@ -24,9 +24,9 @@ from enum import StrEnum
 from typing import Any
 
 from patrol_policy.hours import WeeklyHours
+from strict_files.one_line import clean
 from strict_files.suggestions import nearest
 from surveillance_runtime.incidents import Incident, IncidentUpdate
-from surveillance_runtime.one_line import clean
 
 NOBODY_NAMED = 'a person'
 """Who has done something where no name is told."""

@@ -13,9 +13,7 @@ from surveillance_operator.notify.notification import Notification, notification
 from surveillance_operator.notify.outbox import Outbox
 from surveillance_operator.notify.sinks import read_notify_file, sink_of
 from surveillance_runtime.incidents import IncidentCall
-
-OUTBOX, EVIDENCE = 'outbox', 'evidence'
-"""Folders of a run."""
+from surveillance_runtime.run_files import EVIDENCE, OUTBOX, folder_of
 
 
 def run_command(command: str, text: str) -> str:
@@ -79,8 +77,8 @@ def open_sinks(
 
     def tell(call: IncidentCall) -> None:
         own = call.incident.told.robot
-        of_member = folder / own / EVIDENCE
-        evidence = of_member if own and of_member.is_dir() else folder / EVIDENCE
+        of_member = folder_of(folder, own) / EVIDENCE
+        evidence = of_member if of_member.is_dir() else folder / EVIDENCE
         now = time.time()
         takers = [name for name, each in settings.items() if each.takes.takes(call, now)]
         if takers:

@@ -7,7 +7,6 @@ what goes on and who was called for it, and nobody is called twice or never told
 from __future__ import annotations
 
 import contextlib
-import re
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -22,7 +21,7 @@ from surveillance_runtime.event_log import (
     EventLog,
     RecordEntry,
     age,
-    read_intact,
+    read_newest,
     record_in,
     steady_now,
 )
@@ -36,8 +35,8 @@ from surveillance_runtime.incidents import (
     SeenThing,
     Severity,
 )
+from surveillance_runtime.run_files import folder_of
 
-_A_ROBOT = re.compile('[A-Za-z0-9_]{1,200}')
 MOST_PAST = 1000
 """So many alarms that are over can still be acknowledged, the newest."""
 LISTED = 20
@@ -129,9 +128,7 @@ class IncidentKeeper:
         """Write an entry to the log of a robot, or to that of what robots share."""
         if self._folder is None:
             return
-        # Anybody may tell of something in any name: it is no path.
-        own = self._folder / robot if _A_ROBOT.fullmatch(robot) else self._folder
-        path = record_in(own if own.is_dir() else self._folder)
+        path = record_in(folder_of(self._folder, robot))
         # A full disk: the entry waits, and people are told all the same.
         with contextlib.suppress(FileError):
             if path not in self._logs:
@@ -200,7 +197,7 @@ class IncidentKeeper:
             begun: dict[str, tuple[RecordEntry, list[RecordEntry]]] = {}
             known: dict[str, IncidentUpdate] = {}
             # A file may have been packed away while something went on.
-            for entry in read_intact(record_in(own), packed=1):
+            for entry in read_newest(record_in(own), packed=1):
                 with contextlib.suppress(ValueError, TypeError, LookupError):  # a stranger's line
                     if entry.name == 'handling':
                         done = Handled.from_fields(entry.fields, entry.at or 0.0)

@@ -6,12 +6,12 @@ import base64
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from strict_files.one_line import clean
 from surveillance_runtime.incidents import IncidentCall, IncidentUpdate
-from surveillance_runtime.one_line import clean
 
 
 @dataclass(frozen=True)
@@ -70,14 +70,19 @@ class Notification:
         return json.dumps({**self.to_json(), 'pictures': list(self.pictures)})
 
     @classmethod
-    def from_kept(cls, text: str) -> Notification:
-        """Return what `kept` gave.
+    def from_kept(cls, kept: Any) -> Notification:
+        """Return the notification that `kept` gave, whose text was read as JSON.
 
         Raises:
             ValueError, KeyError, TypeError: It is something else.
         """
-        values = json.loads(text)
-        values['pictures'] = tuple(str(each) for each in values['pictures'])
+        texts = [each.name for each in fields(cls) if each.type == 'str']
+        if not isinstance(kept, dict) or any(type(kept.get(name, '')) is not str for name in texts):
+            raise ValueError('expected a notification')
+        values = dict(kept)
+        values['at'], values['over'] = float(kept['at']), bool(kept['over'])
+        values['event'] = dict(kept.get('event', {}))
+        values['pictures'] = tuple(str(each) for each in kept['pictures'])
         return cls(**values)
 
 

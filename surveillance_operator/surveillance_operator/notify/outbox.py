@@ -1,9 +1,10 @@
 """The outbox: notifications that wait on the disk until each sink has taken them.
 
 A sink that cannot be reached is tried again after 1, 2, 4 ... seconds, at most every five minutes,
-for a day. What one sink can never take, as its text cannot be written in a mail, is put aside and
-told of; what it does not take now lets the next one pass. What waits outlives the process; what was
-handed in before is not handed in again.
+for a day from when this process has it, by a clock that nobody sets. What one sink can never take,
+as its text cannot be written in a mail, is put aside and told of; what it does not take now lets
+the next one pass. What waits outlives the process, a file that cannot be read is put aside; what
+was handed in before is not handed in again.
 """
 
 from __future__ import annotations
@@ -14,10 +15,13 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Container, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from strict_files.files import keep_aside, read_json
 from surveillance_operator.notify.notification import Notification
+from surveillance_runtime.event_log import steady_now
 
 FIRST_WAIT, LONGEST_WAIT = 1.0, 300.0
 """Between two tries, seconds; the wait doubles."""
@@ -29,6 +33,10 @@ MOST_WAITING = 1000
 """So many notifications wait for a sink; the oldest goes first."""
 REMEMBERED = 2000
 """So many keys of notifications that were handed in are remembered."""
+
+KNOWN = 'known.json'
+LARGEST = 1_000_000
+"""Bytes that are read of a file."""
 
 Deliver = Callable[[Notification], None]
 """Hands a notification to a sink; raises `DeliveryError` when it did not take it."""
@@ -51,6 +59,7 @@ class DeliveryError(Exception):
 class _Pending:
     notification: Notification
     path: Path
+    since: float
     tries: int = 0
     next_try: float = 0.0
 
@@ -90,7 +99,7 @@ class Outbox:
         folder: Where what waits is kept; made when missing.
         sinks: By name.
         report: Takes a line about a sink that fails, and that works again.
-        now: Seconds since 1970.
+        now: Seconds on a clock that nobody sets.
         trouble: Takes the name of a sink that a person should look at, and why; empty: it works.
 
     Raises:
@@ -102,7 +111,7 @@ class Outbox:
         folder: Path,
         sinks: Mapping[str, Deliver],
         report: Callable[[str], object] = lambda _: None,
-        now: Callable[[], float] = time.time,
+        now: Callable[[], float] = steady_now,
         trouble: Callable[[str, str], object] = lambda _sink, _text: None,
     ) -> None:
         self._folder, self._report, self._now = folder, report, now
@@ -110,7 +119,7 @@ class Outbox:
         self._changed = threading.Condition()
         self._ended = False
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        self._known = deque(_keys(folder / 'known.json'), maxlen=REMEMBERED)
+        self._known = deque(self._keys(folder / KNOWN), maxlen=REMEMBERED)
         self._queues = [_Queue(name, sinks[name], folder / name) for name in sinks]
         self._number = 0
         for queue in self._queues:
@@ -141,14 +150,14 @@ class Outbox:
                 if only is not None and queue.name not in only:
                     continue
                 self._number += 1
-                path = queue.folder / f'{self._now():017.6f}_{self._number:06d}.json'
+                path = queue.folder / f'{self._number:012d}.json'
                 _write(path, notification.kept(), self._report)
-                queue.waiting.append(_Pending(notification, path))
+                queue.waiting.append(_Pending(notification, path, self._now()))
                 while len(queue.waiting) > MOST_WAITING:
                     oldest = queue.waiting.popleft()
                     oldest.path.unlink(missing_ok=True)
                     self._report(f'{queue.name}: more than {MOST_WAITING} wait, dropped the oldest')
-            _write(self._folder / 'known.json', json.dumps(list(self._known)), self._report)
+            _write(self._folder / KNOWN, json.dumps(list(self._known)), self._report)
             self._changed.notify_all()
         return True
 
@@ -201,7 +210,7 @@ class Outbox:
         with self._changed:
             if problem is None:
                 trouble = self._taken(queue, each)
-            elif problem.final or self._now() - each.notification.at > GIVEN_UP_AFTER:
+            elif problem.final or self._now() - each.since > GIVEN_UP_AFTER:
                 trouble = f'{problem}; not told: {each.notification.text}'
                 self._report(f'{queue.name}: {trouble}')
                 queue.is_told = True
@@ -260,20 +269,30 @@ class Outbox:
 
     def _read(self, queue: _Queue) -> None:
         for path in sorted(queue.folder.glob('*.json')):
+            if path.stem.isdecimal():
+                self._number = max(self._number, int(path.stem))
             try:
-                notification = Notification.from_kept(path.read_text('utf-8'))
-            except (OSError, ValueError, KeyError, TypeError):
-                path.unlink(missing_ok=True)  # cut off by a crash
+                notification = Notification.from_kept(read_json(path, LARGEST))
+            except (ValueError, KeyError, TypeError) as error:
+                self._put_aside(path, error)
                 continue
-            queue.waiting.append(_Pending(notification, path))
+            queue.waiting.append(_Pending(notification, path, self._now()))
 
+    def _keys(self, path: Path) -> list[str]:
+        try:
+            keys = read_json(path, LARGEST)
+            if not isinstance(keys, list | None):
+                raise ValueError('expected a list')
+        except ValueError as error:
+            self._put_aside(path, error)
+            keys = None
+        return [str(each) for each in keys or ()]
 
-def _keys(path: Path) -> list[str]:
-    try:
-        keys = json.loads(path.read_text('utf-8'))
-    except (OSError, ValueError):
-        return []
-    return [str(each) for each in keys] if isinstance(keys, list) else []
+    def _put_aside(self, path: Path, error: Exception) -> None:
+        problem = str(error).removeprefix(f'{path}: ')
+        self._report(f'{path}: damaged: {problem:.100}; it is put aside, the others are told')
+        with suppress(OSError):
+            keep_aside(path)
 
 
 def _write(path: Path, text: str, report: Callable[[str], object]) -> None:

@@ -41,13 +41,13 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from patrol_policy.hours import WeeklyHours
+from strict_files.one_line import clean
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import EntryError, read_table
 from surveillance_operator.desk.handling import kinds_of
 from surveillance_operator.notify.notification import Notification, as_base64
 from surveillance_operator.notify.outbox import Deliver, DeliveryError
 from surveillance_runtime.incidents import IncidentCall, Severity
-from surveillance_runtime.one_line import clean
 
 PICTURES = ('blurred', 'sharp', 'none')
 

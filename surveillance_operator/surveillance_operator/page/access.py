@@ -22,9 +22,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from strict_files.one_line import clean
 from strict_files.regular_files import read_file
 from strict_files.suggestions import nearest
-from surveillance_runtime.one_line import clean
 
 VIEWER, GUARD, OPERATOR = ROLES = ('viewer', 'guard', 'operator')
 """From the one that may least to the one that may most."""

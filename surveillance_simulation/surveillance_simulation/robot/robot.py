@@ -125,7 +125,7 @@ class Robot:
             x, y, yaw, *odometry, time = (float(state[name]) for name in _STATE)
             closed = str(state['closed']).splitlines()
             collisions = int(state['collisions'])
-        except (KeyError, ValueError, OverflowError):
+        except (KeyError, ValueError, TypeError, OverflowError):
             return False
         finite = all(map(math.isfinite, (x, y, yaw, *odometry, time)))
         doors = self.world.plan.doors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from surveillance_runtime.one_line import LONGEST, clean, without_controls
+from strict_files.one_line import LONGEST, clean, without_controls
 
 pytestmark = pytest.mark.unit
 

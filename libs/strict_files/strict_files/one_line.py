@@ -1,4 +1,4 @@
-"""Texts from the network as one line of bounded length, without control characters."""
+"""Texts of strangers as one line of bounded length, without control characters."""
 
 from __future__ import annotations
 
