@@ -42,6 +42,8 @@ def runs_folder(checkout: Path = CHECKOUT) -> Path:
 
 
 CONFIG = CHECKOUT / 'config'
+WITH = ('nav2', 'mujoco', 'notify')
+"""Groups of optional dependencies that a user may ask for."""
 RUNS = runs_folder()
 EXIT_INTERRUPTED = 130
 
@@ -266,8 +268,18 @@ def _setup(argv: list[str]) -> int:
     either.add_argument(
         '--collect', type=Path, metavar='DIR', help='fill a folder for --wheels, then end'
     )
+    parser.add_argument(
+        '--with',
+        dest='extras',
+        action='append',
+        default=[],
+        choices=WITH,
+        metavar='|'.join(WITH),
+        help='also set up: nav2 (messages of Nav2), mujoco (physics for the simulated robot), notify '
+        '(news by MQTT)',
+    )
     options = parser.parse_args(argv)
-    environment = _environment((), options.wheels)
+    environment = _environment(options.extras, options.wheels)
     if environment is not None and options.collect is not None:
         environment.collect(options.collect)
         print(f'collected in {options.collect}: python3 launch.py setup --wheels DIR')

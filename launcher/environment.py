@@ -29,7 +29,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from launcher import system
+from launcher import nav2_messages, system
 from launcher.progress import Output, SetUpStep
 from strict_files.files import replace_text
 from strict_files.regular_files import parse_json
@@ -157,7 +157,7 @@ def complete(checkout: Path, extras: Iterable[str]) -> SetUpJournal:
         checkout=str(checkout),
         extras=sorted(extras),
         packages=_hash(line.encode() for line in requirements(checkout, extras)),
-        interfaces=_hash(_sources(checkout / INTERFACES)),
+        interfaces=_hash(chain(_sources(checkout / INTERFACES), _sources_of_nav2(extras))),
     )
 
 
@@ -166,6 +166,12 @@ def _sources(folder: Path) -> Iterable[bytes]:
         if path.is_file() and not {'build', '__pycache__'} & set(path.relative_to(folder).parts):
             yield path.relative_to(folder).as_posix().encode()
             yield path.read_bytes()
+
+
+def _sources_of_nav2(extras: Iterable[str]) -> Iterable[bytes]:
+    if nav2_messages.EXTRA in extras:
+        for name, text in nav2_messages.ACTIONS.items():
+            yield f'{name}\n{text}'.encode()
 
 
 def _hash(pieces: Iterable[bytes]) -> str:
@@ -322,8 +328,13 @@ class PythonEnvironment:
 
     def _lacking_messages(self) -> list[Path]:
         """Return the sources of messages that an installed ROS has and the wheels lack."""
-        found = (self.checkout / INTERFACES).glob('*/pyproject.toml')
-        return [file.parent for file in sorted(found)]
+        interfaces = self.checkout / INTERFACES
+        found = [file.parent for file in sorted(interfaces.glob('*/pyproject.toml'))]
+        if nav2_messages.EXTRA in self._extras(SetUpJournal.read(self.venv)):
+            folder = self.checkout / 'build' / 'nav2_msgs_sources'
+            nav2_messages.write_package(folder, interfaces)
+            found.append(folder)
+        return found
 
     def drop_missing_middleware(self, environ: MutableMapping[str, str]) -> list[str]:
         """Take a middleware that is not installed out of an environment; rcl would exit with 102.

@@ -12,6 +12,7 @@ import pytest
 from lidar_navigation.testing import Flat
 from surveillance_simulation.world.simulated_place import SimulatedPlace
 from tests import places
+from tests.controllers import nav2_servers
 from tests.places import seven_rooms_parameters
 
 
@@ -75,3 +76,15 @@ def flat() -> Flat:
 def seven_rooms_world() -> SimulatedPlace:
     """Provide the seven rooms, as simulated."""
     return places.seven_rooms()
+
+
+@pytest.fixture
+def servers(monkeypatch: pytest.MonkeyPatch) -> nav2_servers.Servers:
+    """Provide servers of Nav2 that answer as told."""
+    return nav2_servers.scripted(monkeypatch)
+
+
+@pytest.fixture
+def run() -> nav2_servers.Run:
+    """Provide a goal's run whose time passes when somebody sleeps."""
+    return nav2_servers.Run()

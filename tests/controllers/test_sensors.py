@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from lidar_navigation import Navigator
 from lidar_navigation.geometry import Pose
 from surveillance_runtime.conversions import seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.sensing.sensors import SensorStream
+from surveillance_runtime.sensing import sensors
+from surveillance_runtime.sensing.sensors import OdometryReader, SensorStream
 from surveillance_runtime.sensing.transforms import TELL_WITHIN, ScanReader
 from tests.controllers.test_navigation_topics import motion_of
 
@@ -82,6 +86,43 @@ def test_the_pose_of_a_robot_whose_clock_is_ahead_is_of_now(graph: Any, flat: An
 
     graph.until(told)
     assert abs(seconds_of(poses[-1].header.stamp) - now_of(graph.node)) < 2.0
+
+
+def test_odometry_that_comes_by_tf_alone_is_read(graph: Any, monkeypatch: Any) -> None:
+    monkeypatch.setattr(sensors, 'BY_TF_AFTER', 0.05)
+    took: list[Pose] = []
+    node = graph.add(PatrolNode, name='reading')
+    reader = OdometryReader(node, lambda pose, _at: took.append(pose), Frames(base='base_link'))
+    frames = graph.node.create_publisher(tf2.TFMessage, 'tf', 10)
+    step = TransformStamped(child_frame_id='base_footprint')
+    step.header.frame_id = '/odom'
+    step.transform.translation.x, step.transform.rotation = 1.5, Quaternion(z=1.0, w=0.0)
+    other = TransformStamped(child_frame_id='odom')
+    other.header.frame_id = 'map'
+
+    def told() -> bool:
+        step.header.stamp = graph.node.get_clock().now().to_msg()
+        frames.publish(tf2.TFMessage(transforms=[other, step]))
+        return bool(took)
+
+    graph.until(told)
+    assert took[-1][0] == 1.5
+    assert abs(took[-1][2]) == pytest.approx(math.pi)
+    assert reader.stream.heard_at is not None
+    # A driver that begins later is heard, and tf is not any more.
+    topic = graph.node.create_publisher(Odometry, 'odom', SENSOR_QOS)
+    graph.until(lambda: reader._by_tf is None)
+    took.clear()
+    message = Odometry()
+    message.pose.pose.position.x = 4.0
+
+    def driven() -> bool:
+        message.header.stamp = graph.node.get_clock().now().to_msg()
+        topic.publish(message)
+        return bool(took)
+
+    graph.until(driven)
+    assert took[-1] == (4.0, 0.0, 0.0)
 
 
 def test_a_scan_waits_a_while_for_where_its_frame_is(graph: Any, monkeypatch: Any) -> None:

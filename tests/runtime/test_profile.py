@@ -89,6 +89,13 @@ def test_another_robot_s_topics_types_frames_and_lidars_reach_the_nodes(tmp_path
     assert dict(remappings(file.profile, alone, 'ROBOT'))['cmd_vel'] == 'base/cmd'
 
 
+def test_a_footprint_may_be_the_text_that_nav2_has(tmp_path: Path) -> None:
+    path = tmp_path / 'robot.yaml'
+    path.write_text('body: {footprint: "[ [0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2] ]"}')
+    profile = read_profile(path).profile
+    assert profile.body.footprint == (0.3, 0.2, -0.3, 0.2, -0.3, -0.2, 0.3, -0.2)
+
+
 def test_beside_nav2_its_names_are_left_to_it(tmp_path: Path) -> None:
     path = tmp_path / 'robot.yaml'
     path.write_text('dock: {navigator: nav2}')
@@ -112,8 +119,9 @@ def test_beside_nav2_its_names_are_left_to_it(tmp_path: Path) -> None:
         ('topics: {scans: [a, a]}', 'that differ'),
         ('topics: {command: cmd_vel, wanted: cmd_vel}', 'expected two topics'),
         ('types: {command: twist_stamped}', "expected one of 'Twist', 'TwistStamped'"),
-        ('body: {footprint: [[1, 0], [0, 1]]}', 'corners x, y of a convex polygon'),
+        ('body: {footprint: [[1, 0], [0, 1]]}', 'corners x, y of a polygon'),
         ('body: {footprint: [[1, 1], [2, 1], [2, 2], [1, 2]]}', 'around the centre'),
+        ('body: {footprint: [[1, 1], [-1, -1], [1, -1], [-1, 1]]}', 'sides do not cross'),
         ('body: {radius: -1}', 'a number from 0.01'),
         ('lidars: {mounts: [[0, 0, 0], [0, 0, 1]]}', '2 mounts for 1 topics.scans'),
         ('lidars: {mounts: [[0, 0, 0, 1.57]]}', 'hangs upside down'),

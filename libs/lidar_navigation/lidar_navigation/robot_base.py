@@ -27,27 +27,51 @@ def robot_deceleration() -> float:
 
 
 def footprint(values: Sequence[float]) -> str | None:
-    """Ask for the corners of the robot, if for anything: a convex polygon around its centre."""
+    """Ask for the corners of the robot, if for anything: a polygon around its centre, which need
+    not be convex.
+    """
     if not values:
         return None
-    corners = list(zip(values[::2], values[1::2], strict=False))
     expected = (
-        'the corners x, y of a convex polygon around the centre of the robot, in order, '
-        'at least 3, within 20 m'
+        'the corners x, y of a polygon around the centre of the robot, in order, at least 3, '
+        'within 20 m, whose sides do not cross'
     )
-    if len(values) % 2 or len(corners) < 3 or max(map(abs, values)) > 20.0:
+    if len(values) % 2 or len(values) < 6 or not max(map(abs, values)) <= 20.0:
         return expected
+    corners = list(zip(values[::2], values[1::2], strict=True))
     sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
-    # Around the centre each side turns the same way.
-    turns = [x1 * y2 - x2 * y1 for (x1, y1), (x2, y2) in sides]
-    following = [*sides[1:], sides[0]]
-    bends = [
-        (b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0])
-        for (a, b), (c, d) in zip(sides, following, strict=True)
-    ]
-    around = all(turn > 1e-9 for turn in turns) or all(turn < -1e-9 for turn in turns)
-    convex = all(bend >= -1e-9 for bend in bends) or all(bend <= 1e-9 for bend in bends)
-    return None if around and convex else expected
+    count = len(sides)
+    if len(set(corners)) < count:
+        return expected
+    for i, one in enumerate(sides):
+        beside = (i, (i + 1) % count, (i - 1) % count)
+        if any(_cross(*one, *sides[k]) for k in range(count) if k not in beside):
+            return expected
+    # A ray from the centre along x crosses its edge an odd number of times.
+    crossed = 0
+    for (x1, y1), (x2, y2) in sides:
+        if (y1 > 0.0) != (y2 > 0.0):
+            crossed += x1 - y1 * (x2 - x1) / (y2 - y1) > 1e-9
+    return None if crossed % 2 else expected
+
+
+def _cross(
+    a: tuple[float, float],
+    b: tuple[float, float],
+    c: tuple[float, float],
+    d: tuple[float, float],
+) -> bool:
+    """Tell whether two sides have a point in common."""
+
+    def bend(p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]) -> float:
+        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+
+    return (
+        bend(a, b, c) * bend(a, b, d) <= 0.0
+        and bend(c, d, a) * bend(c, d, b) <= 0.0
+        and max(min(a[0], b[0]), min(c[0], d[0])) <= min(max(a[0], b[0]), max(c[0], d[0]))
+        and max(min(a[1], b[1]), min(c[1], d[1])) <= min(max(a[1], b[1]), max(c[1], d[1]))
+    )
 
 
 def robot_footprint() -> tuple[float, ...]:

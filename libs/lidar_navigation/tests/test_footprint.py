@@ -18,6 +18,7 @@ from lidar_navigation import (
     NoPathError,
     PlanningParameters,
     Velocity,
+    robot_base,
 )
 from lidar_navigation.driving.path_following import room_ahead, safe_turn
 from lidar_navigation.driving.sampled_planning import SampledPlanner, is_safe
@@ -34,6 +35,39 @@ def test_gaps_are_those_that_opencv_measures(x: float, y: float) -> None:
     corners = np.array(LONG, np.float32).reshape(-1, 1, 2)
     peer = -cv2.pointPolygonTest(corners, (x, y), True)
     assert float(BODY.gap(x, y)) == pytest.approx(peer, abs=1e-5)
+
+
+L_SHAPED = (0.5, 0.2, -0.3, 0.2, -0.3, -0.6, 0.0, -0.6, 0.0, -0.2, 0.5, -0.2)
+PRONGED = (1.2, 0.3, -0.4, 0.3, -0.4, -0.3, 1.2, -0.3, 1.2, -0.2, 0.2, -0.2, 0.2, 0.2, 1.2, 0.2)
+"""A forklift: between its prongs there is nothing of it."""
+
+
+@given(st.sampled_from([L_SHAPED, PRONGED]), st.floats(-2, 2), st.floats(-2, 2))
+def test_gaps_of_a_robot_that_is_not_convex_are_those_that_opencv_measures(
+    shape: tuple[float, ...], x: float, y: float
+) -> None:
+    corners = np.array(shape, np.float32).reshape(-1, 1, 2)
+    peer = -cv2.pointPolygonTest(corners, (x, y), True)
+    assert float(Footprint(9.0, shape).gap(x, y)) == pytest.approx(peer, abs=1e-5)
+
+
+@pytest.mark.parametrize('shape', [LONG, L_SHAPED, PRONGED])
+def test_its_convex_parts_cover_it_once(shape: tuple[float, ...]) -> None:
+    whole = Footprint(9.0, shape)
+    parts = [Footprint(9.0, tuple(part.ravel().tolist())) for part in whole.convex_parts]
+    assert all(part.is_convex for part in parts)
+    assert len(parts) <= 4
+    x, y = np.random.default_rng(1).uniform(-1.5, 1.5, (2, 4000))
+    held = sum((part.gap(x, y) <= 0.0).astype(int) for part in parts)
+    assert (held == (whole.gap(x, y) <= 0.0)).all()
+
+
+def test_what_is_between_the_prongs_is_not_touched() -> None:
+    forklift = Footprint(9.0, PRONGED)
+    assert forklift.gap(0.7, 0.0) == pytest.approx(0.2)
+    assert forklift.inscribed == pytest.approx(0.2)
+    assert robot_base.footprint(PRONGED) is None
+    assert robot_base.footprint(L_SHAPED) is None
 
 
 def test_its_radii_are_those_of_nav2() -> None:

@@ -12,8 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
+from lidar_navigation import Footprint
 from surveillance_runtime.profile.record import RobotProfile
 
+Shape = tuple[dict[str, dict[str, str]], tuple[float, float, float]]
+"""A form with its sizes, and where its middle is, metres."""
 BASES = ('base_footprint', 'base_link')
 
 
@@ -52,9 +55,9 @@ def fixed_frames(profile: RobotProfile) -> tuple[FixedFrame, ...]:
 
 def description(profile: RobotProfile) -> str:
     """Return the URDF of a robot: body, wheels, lidars and camera as simple shapes."""
-    base, body, wheels = profile.frames.base, profile.body, profile.wheels
+    base, wheels = profile.frames.base, profile.wheels
     robot = ElementTree.Element('robot', name=profile.name)
-    _add_link(robot, base, _body_shape(profile), (*_middle(profile), body.height / 2))
+    _add_link(robot, base, *_body_shapes(profile))
     for frame in fixed_frames(profile):
         _add_link(robot, frame.name)
         _add_joint(robot, 'fixed', frame)
@@ -66,7 +69,7 @@ def description(profile: RobotProfile) -> str:
             (-math.pi / 2, 0.0, 0.0),
         )
         round_shape = {'cylinder': {'radius': f'{wheels.radius:g}', 'length': '0.02'}}
-        _add_link(robot, name, round_shape)
+        _add_link(robot, name, (round_shape, (0.0, 0.0, 0.0)))
         joint = _add_joint(robot, 'continuous', place)
         ElementTree.SubElement(joint, 'axis', xyz='0 0 1')
     _add_link(robot, profile.frames.camera)
@@ -75,42 +78,29 @@ def description(profile: RobotProfile) -> str:
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding='unicode') + '\n'
 
 
-def _corners(profile: RobotProfile) -> Iterator[tuple[float, float]]:
-    values = profile.body.footprint
-    yield from zip(values[::2], values[1::2], strict=True)
+def _body_shapes(profile: RobotProfile) -> Iterator[Shape]:
+    """Yield the body: a cylinder, or the boxes around its convex parts: URDF knows no prism."""
+    body = profile.body
+    if not body.footprint:
+        round_shape = {'radius': f'{body.radius:g}', 'length': f'{body.height:g}'}
+        yield {'cylinder': round_shape}, (0.0, 0.0, body.height / 2)
+    else:
+        for part in Footprint(body.radius, body.footprint).convex_parts:
+            low, high = part.min(axis=0).tolist(), part.max(axis=0).tolist()
+            size = f'{high[0] - low[0]:g} {high[1] - low[1]:g} {body.height:g}'
+            x, y = (low[0] + high[0]) / 2, (low[1] + high[1]) / 2
+            yield {'box': {'size': size}}, (x, y, body.height / 2)
 
 
-def _middle(profile: RobotProfile) -> tuple[float, float]:
-    corners = list(_corners(profile))
-    if not corners:
-        return 0.0, 0.0
-    x, y = zip(*corners, strict=True)
-    return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
-
-
-def _body_shape(profile: RobotProfile) -> dict[str, dict[str, str]]:
-    """Return the body as a cylinder, or the box around its footprint: URDF knows no prism."""
-    body, corners = profile.body, list(_corners(profile))
-    if not corners:
-        return {'cylinder': {'radius': f'{body.radius:g}', 'length': f'{body.height:g}'}}
-    x, y = zip(*corners, strict=True)
-    size = f'{max(x) - min(x):g} {max(y) - min(y):g} {body.height:g}'
-    return {'box': {'size': size}}
-
-
-def _add_link(
-    robot: ElementTree.Element,
-    name: str,
-    shape: dict[str, dict[str, str]] | None = None,
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> None:
+def _add_link(robot: ElementTree.Element, name: str, *shapes: Shape) -> None:
     link = ElementTree.SubElement(robot, 'link', name=name)
-    for kind in ('visual', 'collision') if shape else ():
-        part = ElementTree.SubElement(link, kind)
-        ElementTree.SubElement(part, 'origin', xyz=_numbers(at), rpy='0 0 0')
-        geometry = ElementTree.SubElement(part, 'geometry')
-        for form, sizes in (shape or {}).items():
-            ElementTree.SubElement(geometry, form, sizes)
+    for shape, at in shapes:
+        for kind in ('visual', 'collision'):
+            part = ElementTree.SubElement(link, kind)
+            ElementTree.SubElement(part, 'origin', xyz=_numbers(at), rpy='0 0 0')
+            geometry = ElementTree.SubElement(part, 'geometry')
+            for form, sizes in shape.items():
+                ElementTree.SubElement(geometry, form, sizes)
 
 
 def _add_joint(robot: ElementTree.Element, kind: str, frame: FixedFrame) -> ElementTree.Element:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -96,7 +97,15 @@ def _alternatives(name: str, specs: Mapping[str, Any]) -> list[str]:
 
 
 def _plain(name: str, given: Any) -> Any:
-    """Return a value with its lists of lists (corners, mounts, voltages) as one list."""
+    """Return a value with its lists of lists (corners, mounts, voltages) as one list.
+
+    Nav2 has a footprint as a text that holds such a list.
+    """
+    if name == 'body.footprint' and isinstance(given, str):
+        try:
+            given = json.loads(given)
+        except ValueError:
+            return given
     if not isinstance(given, list) or not any(isinstance(each, list) for each in given):
         return given
     flat: list[Any] = []

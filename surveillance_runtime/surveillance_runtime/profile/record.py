@@ -138,7 +138,11 @@ class Body:
         ROBOT_RADIUS, 'Of a round robot, m; with a footprint that counts.', 0.01, 20.0
     )
     footprint: tuple[float, ...] = parameter(
-        (), 'Corners x, y of a robot that is not round, m; empty: round.', of=float, check=footprint
+        (),
+        "Corners x, y of a robot that is not round, m, or the text of Nav2's `footprint`; empty: "
+        'round.',
+        of=float,
+        check=footprint,
     )
     height: float = parameter(0.35, 'Height of its body, m; only drawn.', 0.01, 5.0)
 

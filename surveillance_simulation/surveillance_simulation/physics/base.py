@@ -18,6 +18,7 @@ import numpy.typing as npt
 from floor_plans.shapes import Pose
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.physics.model import (
+    CHASSIS,
     SOLID,
     STEP,
     PhysicsModel,
@@ -233,7 +234,7 @@ class PhysicsBase:
 
     def _look_for_contact(self, dt: float) -> None:
         geoms = self._data.contact.geom
-        touches = bool((geoms == self._chassis).any()) if len(geoms) else False
+        touches = bool(np.isin(geoms, self._chassis).any()) if len(geoms) else False
         if touches and self._apart >= _APART and any(self._ramped):
             self.collisions += 1
         self._apart = 0.0 if touches else self._apart + dt
@@ -251,7 +252,8 @@ class PhysicsBase:
         self._model = compiled(world, self.model.radius, self.physics, people)
         self._data = mujoco.MjData(self._model)
         self._body = self._model.body('robot').id
-        self._chassis = self._model.geom('chassis').id
+        names = [self._model.geom(each).name for each in range(self._model.ngeom)]
+        self._chassis = [i for i, name in enumerate(names) if name.startswith(CHASSIS)]
         if kept is not None:
             self._data.qpos[:], self._data.qvel[:] = kept
         self._place_people()

@@ -15,6 +15,7 @@ import numpy as np
 
 from floor_plans import shapes
 from floor_plans.shapes import WALL_HEIGHT, WALL_THICKNESS, Pose
+from lidar_navigation import Footprint
 from lidar_navigation.robot_base import robot_footprint
 from strict_files.settings import parameter
 from surveillance_simulation.mujoco_bodies import about_z, add_thing
@@ -29,6 +30,8 @@ _ON_FLOOR, _IN_THE_WAY = 1, 2
 """What touches what: the wheels the floor; the chassis walls, things and people."""
 _CLEARANCE = 0.02
 """Between chassis and floor, metres."""
+CHASSIS = 'chassis'
+"""Name of the first part of the body; further ones have a number behind it."""
 _PERSON_HEIGHT = 1.7
 
 
@@ -130,26 +133,34 @@ def _add_robot(spec: Any, radius: float, robot: PhysicsModel) -> None:
     body = spec.worldbody.add_body(name='robot')
     body.add_freejoint()
     half = max(robot.height - _CLEARANCE, 0.02) / 2
-    shape: dict[str, Any] = {
-        'type': mujoco.mjtGeom.mjGEOM_CYLINDER,
-        'size': [radius, half, 0.0],
-        'pos': [0.0, 0.0, _CLEARANCE + half],
-    }
     corners = np.array(robot.footprint).reshape(-1, 2)
-    if len(corners):
-        heights = np.repeat([_CLEARANCE, _CLEARANCE + 2 * half], len(corners))
-        prism = np.column_stack([np.tile(corners, (2, 1)), heights])
-        spec.add_mesh(name='chassis', uservert=prism.ravel())
-        shape = {'type': mujoco.mjtGeom.mjGEOM_MESH, 'meshname': 'chassis'}
-    body.add_geom(
-        name='chassis',
-        group=ROBOT,
-        contype=_IN_THE_WAY,
-        conaffinity=_IN_THE_WAY,
-        friction=[0.2, 0.005, 0.0001],
-        mass=0.7 * robot.mass,
-        **shape,
-    )
+    shapes: list[dict[str, Any]] = []
+    # MuJoCo takes a mesh for its convex hull: each convex part is one.
+    parts = Footprint(radius, robot.footprint).convex_parts if len(corners) else ()
+    for part in parts:
+        heights = np.repeat([_CLEARANCE, _CLEARANCE + 2 * half], len(part))
+        prism = np.column_stack([np.tile(part, (2, 1)), heights])
+        name = f'{CHASSIS}{len(shapes) or ""}'
+        spec.add_mesh(name=name, uservert=prism.ravel())
+        shapes.append({'type': mujoco.mjtGeom.mjGEOM_MESH, 'meshname': name})
+    if not shapes:
+        shapes.append(
+            {
+                'type': mujoco.mjtGeom.mjGEOM_CYLINDER,
+                'size': [radius, half, 0.0],
+                'pos': [0.0, 0.0, _CLEARANCE + half],
+            }
+        )
+    for number, shape in enumerate(shapes):
+        body.add_geom(
+            name=f'{CHASSIS}{number or ""}',
+            group=ROBOT,
+            contype=_IN_THE_WAY,
+            conaffinity=_IN_THE_WAY,
+            friction=[0.2, 0.005, 0.0001],
+            mass=0.7 * robot.mass / len(shapes),
+            **shape,
+        )
     # What is heavy lies low: motors and battery.
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
