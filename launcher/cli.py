@@ -275,8 +275,8 @@ def _setup(argv: list[str]) -> int:
         default=[],
         choices=WITH,
         metavar='|'.join(WITH),
-        help='also set up: nav2 (messages of Nav2), mujoco (physics for the simulated robot), notify '
-        '(news by MQTT)',
+        help='also set up: nav2 (messages of Nav2), mujoco (physics for the simulated robot), '
+        'notify (news by MQTT)',
     )
     options = parser.parse_args(argv)
     environment = _environment(options.extras, options.wheels)
