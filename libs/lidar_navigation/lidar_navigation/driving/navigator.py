@@ -63,6 +63,8 @@ class Navigator:
             which it sees nothing else.
         obstacles_changed: Set when the obstacles changed; the reader clears it.
         place: The place the robot is in; None while that is not known.
+        trusted: The last scan, from where it was made, and its time, seconds, which never goes
+            back; None where that pose is in doubt.
     """
 
     def __init__(
@@ -92,6 +94,7 @@ class Navigator:
         self.before_search: Callable[[], None] = lambda: None
         self.obstacles_changed = False
         self.place: str | None = None
+        self.trusted: tuple[Pose, Scan, float] | None = None
 
     @property
     def awaits(self) -> tuple[str, ...]:
@@ -261,6 +264,8 @@ class Navigator:
         if self._localiser.plausible:
             self._settle_place(now)
         pose = self._localiser.pose
+        is_trusted = self._localiser.plausible and not self._localiser.ambiguous
+        self.trusted = (pose, scan, now) if is_trusted else None
         if self.stands:
             return None if self.task is None else Velocity()
         if isinstance(self.task, Drive):

@@ -1,0 +1,116 @@
+"""Which doors the robot has seen shut on its way: no door tells it in a real building.
+
+Each scan is read door by door (`indoor_watch.doors`). Most of the last readings must agree before a
+door is shut, or open again: people stand in doorways. A door that has not been looked at for long
+may be open again; the robot has to go there to see it, so it is no longer taken for shut then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from floor_plans.shapes import Segment
+from indoor_watch.doors import DoorState, read_door
+from lidar_navigation.geometry import Pose, Scan, composed
+
+READ_WITHIN = 6.0
+"""Doors are read from here on, metres: farther away too few rays meet them."""
+PERIOD = 0.2
+"""Time between two readings of a door, seconds."""
+READINGS, AGREEING = 8, 7
+"""So many of the last readings must agree."""
+AT_ONCE = 10.0
+"""Readings that are older than this say nothing of now, seconds."""
+COUNTS_FOR = 300.0
+"""A shut door counts for this long after it was seen so last, seconds."""
+_SURE = 0.8
+"""A reading that is less likely than this says nothing."""
+
+
+@dataclass(eq=False)
+class _Door:
+    segment: Segment
+    readings: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=READINGS))
+    shut_at: float | None = None
+
+
+class DoorSight:
+    """Reads doors; owned by whoever calls it, one thread.
+
+    Args:
+        doors: Their openings by name, map frame, metres.
+    """
+
+    def __init__(self, doors: Mapping[str, Segment]) -> None:
+        self._doors = {name: _Door(segment) for name, segment in doors.items()}
+        self._read_at = -math.inf
+        self._shut: frozenset[str] = frozenset()
+
+    @property
+    def doors(self) -> frozenset[str]:
+        """The names of all doors."""
+        return frozenset(self._doors)
+
+    @property
+    def shut(self) -> frozenset[str]:
+        """The doors that count as shut."""
+        return self._shut
+
+    def take_doors(self, doors: Mapping[str, Segment]) -> None:
+        """Take where the doors are now; what is known of those that stay is kept."""
+        before = self._doors
+        self._doors = {
+            name: before[name]
+            if name in before and before[name].segment == segment
+            else _Door(segment)
+            for name, segment in doors.items()
+        }
+        self._shut &= self._doors.keys()
+
+    def see(self, pose: Pose, scan: Scan, now: float) -> bool:
+        """Take a scan made at a pose that is to be trusted; tell whether `shut` changed.
+
+        Args:
+            pose: Where the robot is, map frame.
+            scan: What it sees.
+            now: The scan's time, seconds.
+        """
+        if 0.0 <= now - self._read_at < PERIOD:
+            return False
+        self._read_at = now
+        lidar = composed(pose, scan.mount)
+        turned = scan.angles + lidar[2]
+        ranges = np.minimum(scan.ranges, scan.range_max)
+        ends = np.stack(
+            [lidar[0] + ranges * np.cos(turned), lidar[1] + ranges * np.sin(turned)], axis=1
+        )
+        for door in self._doors.values():
+            x1, y1, x2, y2 = door.segment
+            if math.dist(((x1 + x2) / 2, (y1 + y2) / 2), lidar[:2]) <= READ_WITHIN:
+                self._read(door, lidar, ends, now)
+        before, self._shut = (
+            self._shut,
+            frozenset(
+                name
+                for name, door in self._doors.items()
+                if door.shut_at is not None and 0.0 <= now - door.shut_at <= COUNTS_FOR
+            ),
+        )
+        return self._shut != before
+
+    @staticmethod
+    def _read(door: _Door, lidar: Pose, ends: np.ndarray, now: float) -> None:
+        reading = read_door(door.segment, lidar[:2], ends)
+        if reading is None or reading.confidence < _SURE:
+            return
+        is_shut = reading.state is DoorState.CLOSED
+        if door.readings and not 0.0 <= now - door.readings[-1][0] <= AT_ONCE:
+            door.readings.clear()
+        door.readings.append((now, is_shut))
+        if sum(shut == is_shut for _, shut in door.readings) >= AGREEING:
+            door.shut_at = now if is_shut else None
