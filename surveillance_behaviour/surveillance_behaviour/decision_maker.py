@@ -55,17 +55,16 @@ class DecisionMaker:
         battery: The battery.
         learned: What the robot has learned; default: nothing yet.
         generator: Chance, for the policies that need it.
-        warn: Told once when no robot can keep to the threshold on this map, and when the rules
-            name a class that the ontology does not have.
+        warn: Told once which threshold no robot can keep, and of a class that is not there.
         announce: Told each decision.
         elapsed: Seconds as they pass, whatever the date is set to: drives are measured by them;
             None: by the times that are told.
         rules: What holds for single places.
         tell: Told what can be kept of the places, at the start and when that changes.
         promise: Given the same for each place, whenever what it rests on changes.
-        stations: The stations by their places; how fast one charges is taken for true until it was
-            seen.
+        stations: The stations by their places, with rates that count until they are seen.
         traffic: The robot's way among those of its fleet; default: it is alone.
+        sweeps: Returns how long each place that is swept takes, seconds, as far as is known.
 
     Attributes:
         settings: Those.
@@ -93,6 +92,7 @@ class DecisionMaker:
         stations: Mapping[str, Station] | None = None,
         traffic: Traffic | None = None,
         promise: Callable[[tuple[Promise, ...]], None] = lambda found: None,
+        sweeps: Callable[[], Mapping[str, float]] = dict,
     ) -> None:
         self.settings = settings
         self.learned = learned or LearnedTimes()
@@ -101,7 +101,7 @@ class DecisionMaker:
         self.place = ''
         self.world: Situation | None = None
         self._view = OntologyView(ontology, settings, self.traffic.others_visits, warn, tell)
-        self._map = PatrolMap(places, settings, self.learned.leg_times)
+        self._map = PatrolMap(places, settings, self.learned.leg_times, sweeps)
         self._check = SettingsCheck(settings, warn)
         self.promises = PromiseTeller(settings, tell, promise)
         self._leg = LegTimer(elapsed)

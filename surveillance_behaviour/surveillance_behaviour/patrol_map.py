@@ -25,19 +25,27 @@ class PatrolMap:
         places: Where the places are.
         settings: Of decisions, shared with whoever changes them.
         leg_times: What was learned of the legs.
+        sweeps: Returns how long each place that is swept takes, seconds, as far as is known.
 
     Attributes:
         graph: The part that can be reached from where the robot is.
         places: All places of the map when it was last looked at, within reach or not.
     """
 
-    def __init__(self, places: Places, settings: DecisionSettings, leg_times: LegTimes) -> None:
+    def __init__(
+        self,
+        places: Places,
+        settings: DecisionSettings,
+        leg_times: LegTimes,
+        sweeps: Callable[[], Mapping[str, float]] = dict,
+    ) -> None:
         self.graph = PatrolGraph({})
         self._alike: PatrolGraph | Callable[[], PatrolGraph] = self.graph
         self.places: frozenset[str] = frozenset()
         self._points = places
         self._settings = settings
         self._leg_times = leg_times
+        self._sweeps = sweeps
         self._positions: dict[str, Point] = {}
         self._key: object = None
 
@@ -72,6 +80,8 @@ class PatrolMap:
         times, speed = self._leg_times, self._settings.speed
         exploring = self._settings.exploration_seconds
         times.forget_fit(speed)
+        swept = {p: max(s, own_exploring.get(p, exploring)) for p, s in self._sweeps().items()}
+        own_exploring = {**own_exploring, **swept}
 
         def metres(start: str, goal: str) -> float:
             # Of the points that were asked for here: another place may be taken meanwhile.

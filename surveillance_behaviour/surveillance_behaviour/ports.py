@@ -64,6 +64,10 @@ class Ontology(Protocol):
     def reachable(self, interrupt: Interrupt) -> frozenset[str]:
         """Return the places that an open door leads to from where the robot is."""
 
+    def record_coverage(self, covered: Mapping[str, int], interrupt: Interrupt) -> None:
+        """Tell how much of each place was in view within its threshold, percent."""
+        return
+
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
         """Wait until the robot is in ``place``, for a while; where it is then, empty: unknown."""
 
@@ -270,6 +274,50 @@ class InspectionPort(Protocol):
         """Have the arm look ahead, if there is one; nobody waits for it."""
 
 
+class SweepPort(Protocol):
+    """Who knows how much of a place was in view, and from where to see the rest."""
+
+    def is_swept(self, place: str) -> bool:
+        """Tell whether a visit is to cover all of a place."""
+
+    def threshold(self, place: str) -> float:
+        """Return after how many seconds without a visit a place is URGENT."""
+
+    def begin(self, place: str, since: float) -> float | None:
+        """Begin to sweep a place.
+
+        Args:
+            place: Where the robot is.
+            since: What was in view since then need not be seen again, seconds.
+
+        Returns:
+            The metres of the way; None: the map does not show the place, or not the robot.
+        """
+
+    def next_stop(self) -> Point | None:
+        """Return where to drive next; None: nothing that can be seen is left."""
+
+    def leave_out(self, stop: Point) -> None:
+        """Take note that a stop cannot be reached."""
+
+    def drive(self, stop: Point, interrupt: Interrupt) -> None:
+        """Drive to a point in the same place, and look around there with what must be turned."""
+
+    def position(self) -> Point | None:
+        """Return where the robot is; None: nobody has said."""
+
+    def end(self, seconds: float | None) -> tuple[float, float]:
+        """End the sweep; return which part of the place was in view since the sweep's time, and
+        the metres driven.
+
+        Args:
+            seconds: How long it took; None: it was not finished.
+        """
+
+    def covered(self) -> Mapping[str, float]:
+        """Return which part of each place was in view within its threshold."""
+
+
 class Announcer(Protocol):
     """Where the machine says what it does."""
 
@@ -287,7 +335,7 @@ class Ports:
     """Whom the machines talk to.
 
     ``motion`` serves the machine `surveillance`, ``routine`` the machine `patrol`; ``looking`` is
-    None where nobody watches.
+    None where nobody watches, ``sweeping`` where nobody knows what was in view.
     """
 
     ontology: Ontology
@@ -297,3 +345,4 @@ class Ports:
     motion: Motion | None = None
     routine: Routine | None = None
     looking: InspectionPort | None = None
+    sweeping: SweepPort | None = None

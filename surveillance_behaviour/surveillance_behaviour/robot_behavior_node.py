@@ -1,10 +1,10 @@
 """The node `robot_behavior`: runs one of the machines until it is told to stop.
 
-Subscribes `battery_level`, `battery_low`, `battery_state` and `robot_place`, publishes
-`mission_status` and `paused`, and calls the services and actions of the machine that `behaviour`
-names. Below `robot_behavior/fsm` the machine can be watched, paused and stepped. In the behaviour
-`surveillance` this node decides: it publishes `decision` and offers `why_not` and `go_to`; in
-`patrol` the node `reasoner` does.
+Subscribes `battery_level`, `battery_low`, `battery_state`, `robot_place`, `map` and `amcl_pose`,
+publishes `mission_status`, `coverage` and `paused`, and calls the services and actions of the
+machine that `behaviour` names. Below `robot_behavior/fsm` the machine can be watched, paused and
+stepped. In the behaviour `surveillance` this node decides: it publishes `decision` and offers
+`why_not` and `go_to`; in `patrol` the node `reasoner` does.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from surveillance_behaviour.machines import MACHINES
 from surveillance_behaviour.mission.mission import Mission, MissionSettings
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.ports import Ports
+from surveillance_behaviour.ros_adapters.coverage import RosCoverage, RosSweep
 from surveillance_behaviour.ros_adapters.decision_services import (
     MemorySettings,
     decision_maker_of,
@@ -132,13 +133,22 @@ class RobotBehavior(PatrolNode):
         clock = self._mission_clock
         ontology, places = ros_ontology(self, deadlines), RosPlaces(self, deadlines)
         looking = RosInspection(self, deadlines, clock) if self._looks else None
+        sweep = RosSweep(self, RosCoverage(self, settings, clock.now), deadlines)
         if self._behaviour == 'patrol':
             reasoner = ReasonClient(self, deadlines, ontology, battery)
             routine = RosRoutine(self, deadlines, battery, clock)
             return Ports(
-                ontology, places, self._announcer, reasoner, routine=routine, looking=looking
+                ontology,
+                places,
+                self._announcer,
+                reasoner,
+                routine=routine,
+                looking=looking,
+                sweeping=sweep if sweep.sweeps_any else None,
             )
-        maker = decision_maker_of(self, settings, memory, ontology, places, battery, clock.elapsed)
+        maker = decision_maker_of(
+            self, settings, memory, ontology, places, battery, clock.elapsed, sweep.seconds
+        )
         offer_decision_services(
             self,
             maker,
@@ -146,7 +156,15 @@ class RobotBehavior(PatrolNode):
             lambda: self.mission.recovery.avoided(self.mission.now()),
         )
         motion = RosMotion(self, deadlines)
-        return Ports(ontology, places, self._announcer, maker, motion=motion, looking=looking)
+        return Ports(
+            ontology,
+            places,
+            self._announcer,
+            maker,
+            motion=motion,
+            looking=looking,
+            sweeping=sweep,
+        )
 
     def on_stop(self) -> None:
         """Preempts the machine, so that what it started is cancelled while messages flow."""

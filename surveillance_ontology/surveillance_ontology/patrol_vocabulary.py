@@ -23,6 +23,8 @@ time; what time it is for a robot, seconds."""
 URGENCY_THRESHOLD, ACCEPTED_WAIT = 'urgencyThreshold', 'acceptedWait'
 """After how many seconds without a visit a place becomes URGENT: for the robot, or a place that has
 a threshold of its own; and for a place without, where the robot's is longer than is usual."""
+COVERED = 'covered'
+"""How much of a place's floor was in view within its threshold, whole percent."""
 DATA = Path(__file__).resolve().parent / 'data'
 """The ontologies that come with this package."""
 ONTOLOGY = DATA / 'surveillance.owl'
@@ -73,6 +75,7 @@ def facts_of(place: str) -> tuple[str, ...]:
         f'isIn(?, {place})',
         f'canReach(?, {place})',
         f'visitedAt({place}, ?)',
+        f'covered({place}, ?)',
         f'hasDoor({place}, ?)',
         f'connectedTo({place}, ?)',
     )

@@ -29,6 +29,7 @@ from surveillance_ontology.patrol_vocabulary import (
     ACCEPTED_WAIT,
     CAN_REACH,
     CONNECTED_TO,
+    COVERED,
     IS_IN,
     LOCATION,
     NEVER,
@@ -106,6 +107,7 @@ class RobotOntology:
         self._is_alone = len(fleet) < 2
         self._places: tuple[str, ...] = ()
         self._last: Snapshot | None = None
+        self._covered: dict[str, int] = {}
         # Thresholds of places as the ontology had them last, and whether it has the rule for them.
         self._own: Mapping[str, int] = {}
         self._knows_own: bool | None = None
@@ -171,6 +173,30 @@ class RobotOntology:
                 self._directives.request('REASON'),
             ]
         )
+
+    def record_coverage(self, covered: Mapping[str, int]) -> None:
+        """Tell how much of each place was in view within its threshold; nothing follows from it.
+
+        Args:
+            covered: Whole percent by place; what was told before is not told again.
+
+        Raises:
+            ArmorServiceCallError: The server does not answer.
+            ArmorServiceInternalError: It refuses.
+        """
+        changed = {
+            place: percent
+            for place, percent in covered.items()
+            if place in self._places and self._covered.get(place) != percent
+        }
+        if changed:
+            self._directives.carry_out(
+                [
+                    self._directives.set_value(COVERED, place, each)
+                    for place, each in changed.items()
+                ]
+            )
+            self._covered.update(changed)
 
     def snapshot(
         self,

@@ -104,6 +104,11 @@ KINDS: Mapping[str, EntryKind] = {
     'exploring': EntryKind(('place', 'seconds'), frozenset({'seconds'})),
     'viewpoint': EntryKind(('place', 'point')),
     'look': EntryKind(('place', 'sides', 'left_out')),
+    'sweep': EntryKind(
+        ('place', 'seconds', 'distance', 'covered', 'stops', 'left_out'),
+        frozenset({'seconds', 'distance'}),
+        section=Section('Sweeps', ('seconds', 'distance', 'covered', 'place')),
+    ),
     'verify': EntryKind(('place', 'number', 'found')),
     'recharge': EntryKind(
         ('place', 'seconds'),

@@ -324,3 +324,15 @@ def test_an_ontology_that_is_not_there_is_refused_with_its_name(transport: Count
     ontology = RobotOntology(ArmorClient('one', 'none', transport))
     with pytest.raises(ArmorServiceInternalError, match="unknown reference 'none'"):
         ontology.record_place('E', 1)
+
+
+def test_how_much_of_a_place_was_in_view_is_a_fact_and_told_once(
+    ontology: RobotOntology, armor: ArmorClient, transport: Counting
+) -> None:
+    ontology.snapshot(130.0, ())
+    ontology.record_coverage({'R1': 97, 'nowhere': 5})
+    trips = transport.trips
+    ontology.record_coverage({'R1': 97})
+    assert transport.trips == trips
+    ontology.record_coverage({'R1': 40})
+    assert armor.query.dataprop_b2_ind('covered', 'R1') == ['"40"^^xsd:long']

@@ -157,6 +157,7 @@ def test_a_subscription_follows_one_robot_or_those_of_a_fleet(transport: Listeni
         'isIn(?, R1)',
         'canReach(?, R1)',
         'visitedAt(R1, ?)',
+        'covered(R1, ?)',
         'hasDoor(R1, ?)',
         'connectedTo(R1, ?)',
     )

@@ -9,7 +9,8 @@ Public modules: `drawing` (pictures of places), `editor` (changes, with undo), `
 `imports` (places out of maps, buildings and graphs),
 `map_rooms` (finds rooms and doors), `occupancy_grid` (cells and what is measured on them),
 `occupancy_map` (maps in map_server's format), `parameters` (a place as parameters),
-`shapes` (points, lines, boxes), `writing` (the text of a place's file).
+`shapes` (points, lines, boxes), `visibility` (what is in view from a point), `writing` (the text of
+a place's file).
 """
 
 from floor_plans.description import PlaceFile as PlaceFile

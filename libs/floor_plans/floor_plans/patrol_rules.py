@@ -26,12 +26,14 @@ class PatrolRules:
         exploration: Seconds that the robot explores a place, where it differs.
         calendar: Hours, keep-out places and the quiet hours of the station.
         classes: ROOM or CORRIDOR, where a person says it; else it follows from the doors.
+        swept: Places that are too large to be seen from their point: a visit covers all of it.
     """
 
     thresholds: Mapping[str, float] = field(default_factory=dict)
     exploration: Mapping[str, float] = field(default_factory=dict)
     calendar: Calendar = NO_CALENDAR
     classes: Mapping[str, str] = field(default_factory=dict)
+    swept: frozenset[str] = frozenset()
 
     def with_classes(self, found: Mapping[str, frozenset[str]]) -> Mapping[str, frozenset[str]]:
         """Return the classes of places as a person says them, in place of what was inferred."""
@@ -60,11 +62,7 @@ def patrol_rules(described: Mapping[str, Any], rooms: Collection[str] | None = N
         place: _hours(('hours', place), text, rooms, place)
         for place, text in dict(described.get('hours') or {}).items()
     }
-    keep_out = described.get('keep_out') or ()
-    if not isinstance(keep_out, list | tuple):
-        raise PlaceError(('keep_out',), f'expected a list of rooms, got {keep_out!r}')
-    for place in keep_out:
-        _check_room(('keep_out',), place, rooms)
+    keep_out, swept = (_listed(key, described, rooms) for key in ('keep_out', 'sweep'))
     quiet = described.get('quiet_hours') or ''
     zone = described.get('time_zone') or ''
     try:
@@ -79,11 +77,23 @@ def patrol_rules(described: Mapping[str, Any], rooms: Collection[str] | None = N
         Calendar(
             hours,
             _hours(('quiet_hours',), quiet, None, '') if quiet else None,
-            frozenset(keep_out),
+            keep_out,
             time_zone,
         ),
         _classes(described, rooms),
+        swept,
     )
+
+
+def _listed(
+    key: str, described: Mapping[str, Any], rooms: Collection[str] | None
+) -> frozenset[str]:
+    places = described.get(key) or ()
+    if not isinstance(places, list | tuple):
+        raise PlaceError((key,), f'expected a list of rooms, got {places!r}')
+    for place in places:
+        _check_room((key,), place, rooms)
+    return frozenset(places)
 
 
 def _seconds(

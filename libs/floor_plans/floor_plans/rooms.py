@@ -25,7 +25,9 @@ GEOMETRY_KEYS = (
     *('map_file', 'map_file_resolution', 'map_file_origin', 'robots'),
 )
 PATROL_TABLES = ('thresholds', 'exploration', 'hours', 'classes')
-PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'quiet_hours', 'time_zone')
+PATROL_KEYS = (*PATROL_TABLES, 'keep_out', 'sweep', 'quiet_hours', 'time_zone')
+ROOM_LISTS = ('recharge_rooms', 'keep_out', 'sweep')
+"""Those that list rooms."""
 PLACE_TABLES = (
     *('map', 'room_positions', 'walls', 'doors', 'markers', 'stations', 'robots'),
     *ZONE_TABLES,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from floor_plans import Grid
+from floor_plans.visibility import in_view
 
 Mask = NDArray[np.bool_]
 Spot = tuple[float, float]
@@ -149,20 +150,10 @@ class Viewpoints:
 
     def seen_from(self, spot: Spot) -> Mask:
         """Return the cells that are in view from a point."""
-        grid = self._grid
-        step = grid.resolution / 2
-        angles = np.linspace(-math.pi, math.pi, BEAMS, endpoint=False)
-        along = np.arange(0.0, RANGE, step)
-        x = spot[0] + np.cos(angles)[:, None] * along
-        y = spot[1] + np.sin(angles)[:, None] * along
-        cells = grid.cells_of(np.stack([x.ravel(), y.ravel()], axis=1))
-        inside = grid.contains(cells)
-        rows = np.clip(cells[:, 0], 0, grid.cells.shape[0] - 1)
-        columns = np.clip(cells[:, 1], 0, grid.cells.shape[1] - 1)
-        blocked = (~inside | ~grid.free[rows, columns]).reshape(BEAMS, len(along))
-        open_ = np.logical_and.accumulate(~blocked, axis=1).ravel()
-        seen = np.zeros(grid.cells.shape, np.bool_)
-        seen[rows[open_], columns[open_]] = True
+        seen = in_view(self._grid, spot, RANGE, beams=BEAMS)
+        rows, columns = np.nonzero(seen)
+        if not len(rows):
+            return seen
         # Beams far out are a few cells apart.
         around = slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
         seen[around] |= ndimage.binary_closing(seen[around], np.ones((3, 3), np.bool_))

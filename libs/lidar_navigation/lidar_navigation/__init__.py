@@ -4,8 +4,8 @@ Begin with `python -m lidar_navigation.demo`, then `Navigator`: odometry and sca
 comes out. `localisation` says where the robot is, `planning` finds paths, `driving` follows them,
 `exploration` maps a building. What this module lists is public, and imported when it is first used.
 
-Public modules: `geometry`, `robot_base`, `driving.path_following`, `localisation.odometry`,
-`testing`.
+Public modules: `geometry`, `robot_base`, `coverage`, `driving.path_following`,
+`localisation.odometry`, `testing`.
 """
 
 from __future__ import annotations

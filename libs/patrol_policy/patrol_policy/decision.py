@@ -48,6 +48,8 @@ SHARE = 'share'
 """The rule of a decision that a fleet's share asks for, where the rules ask nothing."""
 WAIT = 'wait'
 """The rule of a decision to stay: another robot of the fleet goes first, or has the dock."""
+SWEEP = 'sweep'
+"""The rule of a decision to go over the only place that there is once more."""
 LONGEST_THRESHOLD = 10**9
 """Seconds: 31 years."""
 
@@ -207,6 +209,11 @@ def _decide(world: Situation, battery: Battery, settings: DecisionSettings) -> D
         return _as_requested(world)
     if world.openings.quiet_for > 0.0:
         return _stay(world, settings, f'quiet hours for {world.openings.quiet_for:.0f} s more')
+    if {*world.classes, *world.graph.places} == {world.place} and not is_closed(world, world.place):
+        reason = (
+            f'{world.place} is the only place there is ({world.idleness_in_words(world.place)})'
+        )
+        return _straight_to(world, world.place, SWEEP, 'sweep', reason, {world.place: 0.0})
     world = planning_view(world, battery, settings)
     energy = energy_of(world, battery, settings)
     try:
@@ -602,7 +609,7 @@ def why_not(place: str, world: Situation, battery: Battery, settings: DecisionSe
         return WhyNot(f'the robot would go to {place} now [{decision.rule}]: {decision.reason}')
     does = 'stays in' if decision.place == world.place else 'goes to'
     instead = f'the robot {does} {decision.place} [{decision.rule}]'
-    if decision.rule in (RECHARGE, REQUEST, QUIET, WAIT):
+    if decision.rule in (RECHARGE, REQUEST, QUIET, WAIT, SWEEP):
         return WhyNot(f'{instead}: {decision.reason}')
     if why := why_closed(world, place):
         return WhyNot(f'{place} is not entered: {why}; {instead}')

@@ -18,6 +18,7 @@ from patrol_policy.decision import (
     why_not,
 )
 from patrol_policy.fleet import FleetOutlook, FleetRobot
+from patrol_policy.graph import graph_of_places
 from patrol_policy.hours import ALWAYS_OPEN, Openings
 from patrol_policy.plan import planner_of
 from patrol_policy.policies import POLICIES
@@ -248,3 +249,19 @@ def test_questions_before_the_first_choice_share_one_plan() -> None:
     assert planned is not None
     assert memory.planner is None
     assert planned.fits(replace(here, priorities=Priorities()), None)
+
+
+def test_the_only_place_is_swept_and_a_robot_that_is_shut_in_asks_for_help() -> None:
+    graph = graph_of_places({'hall': []}, {'hall': (0.0, 0.0, 0.0)}, 1.0, 2.0)
+    hall = {'place': 'hall', 'reachable': (), 'graph': graph, 'visited_at': {'hall': 90.0}}
+    alone = {'hall': frozenset({'ROOM'})}
+    assert chosen(Priorities(), 'oldest', classes=alone, **hall) == ('hall', 'sweep')
+    quiet = Openings({}, frozenset(), {}, quiet_for=60.0)
+    settings = DecisionSettings(recharge_rooms=('hall',))
+    asked = world(classes=alone, openings=quiet, **hall)
+    assert decide(asked, Battery(), settings).rule == 'quiet'
+    asked = world(classes=alone, **hall)
+    assert decide(asked, Battery(10.0, True), settings).rule == 'recharge'
+    others = alone | {'office': frozenset({'ROOM'})}
+    with pytest.raises(NowhereToGoError):
+        decide(world(classes=others, **hall), Battery(), DecisionSettings())

@@ -136,7 +136,7 @@ def follow_path(mission: Mission, ud: Any, interrupt: fsm.Interrupt) -> None:
 
 
 class Looking(MachineState):
-    """Looks at the place, then again at what made an alert that is not sure; with an observer."""
+    """Looks at the place, then again at what made an alert that is not sure; sweeps it."""
 
     task = 'looking'
     ends = ('looked', BATTERY_LOW)
@@ -147,7 +147,8 @@ class Looking(MachineState):
 
     def work(self, ud: Any, interrupt: fsm.Interrupt) -> str:
         mission = self.mission
-        seconds = mission.settings.choice.exploration_seconds
+        stays = mission.ports.looking is not None
+        seconds = mission.settings.choice.exploration_seconds if stays else 0.0
         with mission.battery.interrupting(interrupt, lambda: mission.battery.low) as either:
             self._room_look.explore(seconds, either)
             self._room_look.verify(either)
@@ -263,7 +264,7 @@ def patrol_machine(mission: Mission) -> fsm.StateMachine:
     """Return the machine `patrol` with its recovery; it ends only when it is preempted."""
     machine = fsm.StateMachine([PREEMPTED])
     machine.set_name('patrol')
-    looks = mission.ports.looking is not None
+    looks = mission.ports.looking is not None or mission.ports.sweeping is not None
     machine.set_clock(mission.clock)
     with machine:
         add(

@@ -174,7 +174,9 @@ def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> tuple[list[
     motion, before = mission.ports.motion, mission.place
     assert motion is not None
     _, goal = mission.goal(place, interrupt)
-    start = motion.last_position() or mission.ports.places.position(before, interrupt)
+    sweeping = mission.ports.sweeping
+    here = None if sweeping is None else sweeping.position()
+    start = here or motion.last_position() or mission.ports.places.position(before, interrupt)
     path: list[Point] = []
     for stop in _stops(mission, place, goal, interrupt):
         leg = motion.plan(path[-1] if path else start, stop, interrupt)

@@ -22,6 +22,7 @@ from state_machines.clock import elapsed_of
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.mission_log import side_name, stand_name
+from surveillance_behaviour.mission.sweeping import PlaceSweep
 from surveillance_behaviour.ports import Check, Doubt, InspectionPort, Point
 
 SETTLE = 4.0
@@ -94,6 +95,7 @@ class RoomInspection:
 
     def __init__(self, mission: Mission) -> None:
         self._mission = mission
+        self._sweep = PlaceSweep(mission)
         self._moves = {True: ARM_MOVE, False: BASE_MOVE}
         self._looked_again: deque[int] = deque(maxlen=MOST_DOUBTS)
         self._insisted: Counter[tuple[str, str]] = Counter()
@@ -103,7 +105,8 @@ class RoomInspection:
         self._began = 0.0
 
     def explore(self, seconds: float, interrupt: Interrupt) -> None:
-        """Look at the place where the robot is, and stay for the rest of a time.
+        """Look at the place where the robot is, sweep it if that is to be, and stay for the rest of
+        a time.
 
         What makes an alert that is not sure is looked at again at once. A place that was explored
         for a part of the time before, by a process that was killed, is explored for the rest of it.
@@ -134,6 +137,7 @@ class RoomInspection:
         end = self._began + seconds
         if looking is not None and seconds >= SETTLE:
             self._look(looking, end, interrupt)
+        self._sweep.run(interrupt)
         while (left := end - self._elapsed()) > 0.0:
             if looking is not None and seconds >= SETTLE:
                 self.verify(interrupt)

@@ -464,6 +464,8 @@ def _count(summary: Summary, event: RecordEntry, last_seen: dict[str, float]) ->
             last_seen[place] = event.time
             summary.visits[place] += 1
             summary.distance += event.number('distance')
+        case 'sweep':
+            summary.distance += event.number('distance')
         case 'recharge':
             summary.recharges += 1
             summary.charging_seconds += event.number('seconds')

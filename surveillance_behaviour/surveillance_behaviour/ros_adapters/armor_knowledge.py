@@ -166,6 +166,11 @@ class ArmorKnowledge:
         with self._talking(interrupt):
             return self._ontology.reachable()
 
+    def record_coverage(self, covered: Mapping[str, int], interrupt: fsm.Interrupt) -> None:
+        """Tell how much of each place was in view within its threshold, percent."""
+        with self._talking(interrupt):
+            self._ontology.record_coverage(covered)
+
     @contextmanager
     def _talking(self, interrupt: fsm.Interrupt) -> Iterator[None]:
         """Heed the interrupt, and turn what went wrong into the ports' errors.

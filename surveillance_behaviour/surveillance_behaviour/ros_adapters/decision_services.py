@@ -64,6 +64,7 @@ def decision_maker_of(
     places: Places,
     battery: BatteryMonitor,
     elapsed: Callable[[], float],
+    sweeps: Callable[[], Mapping[str, float]] = dict,
 ) -> DecisionMaker:
     """Return what a robot knows when it decides, with what it learned before.
 
@@ -77,6 +78,7 @@ def decision_maker_of(
         places: Where the places are.
         battery: The battery.
         elapsed: Seconds as they pass on the mission's clock, which no setting of the date changes.
+        sweeps: Returns how long each place that is swept takes, seconds, as far as is known.
     """
     log = node.get_logger()
     stations = described_stations(node, settings.recharge_rooms)
@@ -131,6 +133,7 @@ def decision_maker_of(
         stations,
         traffic,
         promise,
+        sweeps,
     )
     decision_maker.learn_draw(elapsed)
 

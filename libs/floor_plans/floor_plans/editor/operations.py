@@ -21,7 +21,7 @@ from floor_plans.editor.measures import (
 )
 from floor_plans.floor_plan import Door, FloorPlan
 from floor_plans.room_map import RoomMap
-from floor_plans.rooms import PATROL_TABLES, problem_in_name
+from floor_plans.rooms import PATROL_TABLES, ROOM_LISTS, problem_in_name
 from strict_files.suggestions import nearest
 
 _ROOM_TABLES = ('map', 'room_positions', 'stations', *PATROL_TABLES)
@@ -123,7 +123,7 @@ def join(draft: Draft, first: str, second: str) -> str:
         draft.table(table).pop(second, None)
     if draft.described.get('robot_room') == second:
         draft.described['robot_room'] = first
-    for key in ('recharge_rooms', 'keep_out'):
+    for key in ROOM_LISTS:
         if second in (listed := list(draft.described.get(key) or ())):
             draft.put(
                 key, list(dict.fromkeys(first if each == second else each for each in listed))
@@ -142,7 +142,7 @@ def remove_room(draft: Draft, room: str) -> str:
         draft.table('doors').pop(door, None)
     for table in _ROOM_TABLES[1:]:
         draft.table(table).pop(room, None)
-    for key in ('recharge_rooms', 'keep_out'):
+    for key in ROOM_LISTS:
         draft.put(key, [each for each in draft.described.get(key) or () if each != room])
     if draft.described.get('robot_room') == room:
         draft.described['robot_room'] = next(iter(rooms))
@@ -286,7 +286,7 @@ def rename(draft: Draft, kind: str, name: str, new: str) -> str:
         for room, doors in draft.table('map').items():
             draft.table('map')[room] = [new if door == name else door for door in doors]
     if kind == 'room':
-        for key in ('recharge_rooms', 'keep_out'):
+        for key in ROOM_LISTS:
             if key in draft.described:
                 listed = draft.described[key]
                 draft.described[key] = [new if each == name else each for each in listed]

@@ -314,8 +314,9 @@ def _carry_over(
         if entries:
             parameters[table] = entries
     parameters |= {key: described[key] for key in _AS_THEY_ARE if key in described}
-    if listed := [room for room in described.get('keep_out') or () if room in kept]:
-        parameters['keep_out'] = listed
+    for key in ('keep_out', 'sweep'):
+        if listed := [room for room in described.get(key) or () if room in kept]:
+            parameters[key] = listed
     for table in ('keep_out_zones', 'slow_zones'):
         zones = {}
         for name, row in dict(described.get(table) or {}).items():
