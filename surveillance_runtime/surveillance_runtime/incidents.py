@@ -302,6 +302,13 @@ class Incidents:
             return tuple(replace(each, phase=IncidentPhase.UPDATE) for each in self._open.values())
 
 
+def thing_of(told: IncidentUpdate) -> Cause:
+    """Return what an incident is about, whoever tells of it: of a finding about a door the door."""
+    seen = told.finding
+    is_door = seen is not None and seen.kind in ('door', 'way') and seen.subject
+    return Cause('door', seen.subject) if seen is not None and is_door else told.cause
+
+
 # --- for all nodes ---
 
 FIRST_AGAIN = 240.0
@@ -492,6 +499,7 @@ class IncidentBook:
         """Call whom it is time to call; return when to look again, None: after news."""
         for key, each in list(self._open.items()):
             if each.ends_at is not None and now >= each.ends_at:
+                self._spare(each, now)
                 del self._open[key]
                 self._finish(each, each.ends_at - SETTLED)
         due = [each.ends_at for each in self._open.values() if each.ends_at is not None]
@@ -503,6 +511,12 @@ class IncidentBook:
                 self._escalate(each, now)
             due += [] if at is None else [at]
         return min(due, default=None)
+
+    def _spare(self, ending: _Open, now: float) -> None:
+        """Give the consequences of what ends time to end as well."""
+        for first, following in self._joined():
+            for each in following if first is ending else ():
+                each.next_call = max(each.next_call, now + TOLD_AGAIN)
 
     def close(self, now: float) -> None:
         """End: what is over is told as such, though it might have begun again."""
@@ -517,15 +531,34 @@ class IncidentBook:
 
     def _calling(self) -> Iterator[_Open]:
         """Yield the incidents for which somebody is called."""
+        for each, _ in self._joined():
+            # Who takes care of it need not be called again.
+            if not each.incident.told.acknowledged_by and not self._is_quiet(each.incident):
+                yield each
+
+    def _joined(self) -> list[tuple[_Open, list[_Open]]]:
+        """Return the alarms, each with its consequences, which are no alarms of their own.
+
+        Of one thing of one robot, as a shut door that the observer sees and that the mission waits
+        at, the later ones are consequences of the first; how the robot fares is one of whatever
+        else is wrong.
+        """
         alarms = [e for e in self._open.values() if e.incident.told.severity is Severity.ALARM]
-        explained = any(e.incident.told.cause.kind != CONSEQUENCE for e in alarms)
+        found: dict[tuple[str, Cause], tuple[_Open, list[_Open]]] = {}
+        faring = []
         for each in alarms:
             told = each.incident.told
-            # Who takes care of it need not be called again.
-            if told.acknowledged_by or self._is_quiet(each.incident):
-                continue
-            if told.cause.kind != CONSEQUENCE or not explained:
-                yield each
+            key = told.robot, thing_of(told)
+            if told.cause.kind == CONSEQUENCE:
+                faring.append(each)
+            elif key in found:
+                found[key][1].append(each)
+            else:
+                found[key] = each, []
+        if not found:
+            return [(each, []) for each in faring]
+        next(iter(found.values()))[1].extend(faring)
+        return list(found.values())
 
     def _escalates_at(self, each: _Open) -> float | None:
         """Return when others are called for an incident, too; None: all are."""
@@ -542,12 +575,18 @@ class IncidentBook:
     def _reached(self, each: _Open) -> float:
         return self._escalations[each.escalated - 1] if each.escalated else 0.0
 
+    def _so(self, each: _Open) -> str:
+        """Say the consequences of an incident; empty: there are none."""
+        following = next((also for first, also in self._joined() if first is each), [])
+        texts = dict.fromkeys(other.incident.told.text for other in following)
+        return f'; so: {"; ".join(texts)}' if texts else ''
+
     def _call_for(self, each: _Open, now: float) -> None:
         incident = each.incident
         since = f' (for {_span(now - incident.began)} now)' if incident.calls else ''
         each.next_call = now + _again(incident.calls + 1)
         each.incident = incident = replace(incident, calls=incident.calls + 1)
-        text, reached = incident.told.text + since, self._reached(each)
+        text, reached = incident.told.text + since + self._so(each), self._reached(each)
         self._call(IncidentCall(text, incident, incident.calls, False, reached))
 
     def _finish(self, each: _Open, now: float) -> None:

@@ -159,3 +159,27 @@ def test_a_sink_that_is_away_is_not_tried_for_each_and_told_of_after_a_while(
         due = outbox.deliver_due('a')
     assert len(tries) < 20
     assert troubles[0][1].startswith('no answer in time for ')
+
+
+def test_what_an_ended_run_could_not_hand_over_the_next_one_does(tmp_path: Path) -> None:
+    """A person calls an alarm false, and the run ends before the sink has answered."""
+    clock, away, there = Clock(), Sink(), Sink()
+    away.problems = [DeliveryError('no answer in time')]
+    ended = Outbox(tmp_path / 'one', {'a': away}, now=clock)
+    ended.put(news('all clear', at=clock.now))
+    ended.deliver_due('a')
+    running = Outbox(tmp_path / 'two', {'a': away}, now=clock)
+    running.put(news('still sent by its own run', at=clock.now))
+    ended.close(0.0)
+    following = Outbox(tmp_path / 'three', {'a': there, 'b': Sink()}, now=clock)
+    for folder in ('one', 'two', 'three', 'missing'):
+        following.take_over(tmp_path / folder, clock.now - 60.0)
+    following.deliver_due('a')
+    assert there.taken == ['all clear']
+    assert not list((tmp_path / 'one' / 'a').iterdir())
+    running.close(0.0)
+    later = Outbox(tmp_path / 'four', {'a': there}, now=clock)
+    later.take_over(tmp_path / 'two', clock.now + 1.0)
+    assert later.waiting() == {'a': 0}, 'nobody is told of what is too old'
+    following.close(0.0)
+    later.close(0.0)

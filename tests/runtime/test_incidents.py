@@ -88,6 +88,8 @@ def test_who_waits_for_a_cause_that_is_told_is_no_second_call() -> None:
     incidents.hear(alarm(scan, '', over=True, node='m'), 10.0)
     incidents.advance(10.0 + SETTLED)
     assert calls[1].startswith('all clear')
+    # It may end as well within moments; when it does not, somebody is called.
+    incidents.advance(10.0 + SETTLED + TOLD_AGAIN)
     assert calls[2:] == ['waits for help']
 
 
@@ -212,3 +214,60 @@ def test_an_end_is_told_after_the_change_that_came_before_it() -> None:
     incidents.begin(D1, 'D1 is locked')
     ending[0].join()
     assert told == [IncidentPhase.BEGIN, IncidentPhase.UPDATE, IncidentPhase.END]
+
+
+def seen_door(name: str = 'D3', **more: Any) -> IncidentUpdate:
+    seen = SeenThing(1, 'door', 'closed', name)
+    text = f'1: door {name} is closed in R3'
+    return alarm(Cause('event', '1'), text, node='observer', finding=seen, **more)
+
+
+def test_a_shut_door_with_its_consequences_is_one_incident() -> None:
+    """The observer sees it, the mission waits at it, and the robot gets no further."""
+    incidents, calls, _ = book()
+    waits = alarm(Cause('door', 'D3'), 'the robot waits for help in R3: D3 is closed')
+    stuck = alarm(Cause('robot', 'purpose'), 'nothing has happened for 60 s')
+    incidents.hear(seen_door(), 0.0)
+    incidents.hear(waits, 5.0)
+    incidents.hear(stuck, 9.0)
+    incidents.advance(FIRST_AGAIN)
+    assert calls[0] == '1: door D3 is closed in R3'
+    assert calls[1:] == [
+        '1: door D3 is closed in R3 (for 4 min now); so: the robot waits for help in R3: '
+        'D3 is closed; nothing has happened for 60 s'
+    ]
+    incidents.hear(seen_door(over=True), 300.0)
+    incidents.advance(300.0 + SETTLED)
+
+    assert len(calls) == 3, 'the all-clear, and no call for what ends with it'
+    assert calls[-1].startswith('all clear after 5 min')
+    for cause, text in ((Cause('door', 'D3'), 'it goes on'), (Cause('robot', 'purpose'), 'moves')):
+        incidents.hear(alarm(cause, text, over=True), 310.0)
+    incidents.advance(310.0 + 2 * TOLD_AGAIN)
+    assert len(calls) == 3
+
+
+def test_another_door_or_another_robot_is_an_incident_of_its_own() -> None:
+    incidents, calls, _ = book()
+    incidents.hear(seen_door(), 0.0)
+    incidents.hear(alarm(Cause('door', 'D4'), 'D4 is closed'), 1.0)
+    incidents.hear(alarm(Cause('door', 'D3'), 'D3 is closed', robot='robot_2'), 2.0)
+    assert calls == ['1: door D3 is closed in R3', 'D4 is closed', 'D3 is closed']
+
+
+def test_a_consequence_that_outlives_its_cause_is_called_for() -> None:
+    incidents, calls, _ = book()
+    incidents.hear(seen_door(), 0.0)
+    incidents.hear(alarm(Cause('door', 'D3'), 'the robot waits for help'), 5.0)
+    incidents.hear(seen_door(over=True), 100.0)
+    incidents.advance(100.0 + SETTLED)
+    incidents.advance(100.0 + SETTLED + TOLD_AGAIN)
+    assert calls[-1] == 'the robot waits for help'
+
+
+def test_a_false_alarm_two_seconds_before_the_end_is_told() -> None:
+    incidents, calls, _ = book()
+    incidents.hear(seen_door(), 0.0)
+    incidents.hear(seen_door(over=True), 98.0)
+    incidents.close(100.0)
+    assert calls[-1].startswith('all clear after')

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from surveillance_operator.notify.notification import Notification, notification_of
-from surveillance_operator.notify.outbox import Outbox
+from surveillance_operator.notify.outbox import GIVEN_UP_AFTER, Outbox
 from surveillance_operator.notify.sinks import read_notify_file, sink_of
 from surveillance_runtime.incidents import IncidentCall
 from surveillance_runtime.run_files import EVIDENCE, OUTBOX, folder_of
@@ -73,6 +73,9 @@ def open_sinks(
     settings = {each.name: each for each in read_notify_file(file)}
     sinks = {name: sink_of(each) for name, each in settings.items()}
     outbox = Outbox(folder / OUTBOX, sinks, report, trouble=trouble)
+    # What an earlier run could not hand over: its end was not waited for.
+    for earlier in sorted(folder.parent.glob(f'*/{OUTBOX}')):
+        outbox.take_over(earlier, time.time() - GIVEN_UP_AFTER)
     outbox.start()
 
     def tell(call: IncidentCall) -> None:

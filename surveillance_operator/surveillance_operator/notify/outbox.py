@@ -4,11 +4,13 @@ A sink that cannot be reached is tried again after 1, 2, 4 ... seconds, at most 
 for a day from when this process has it, by a clock that nobody sets. What one sink can never take,
 as its text cannot be written in a mail, is put aside and told of; what it does not take now lets
 the next one pass. What waits outlives the process, a file that cannot be read is put aside; what
-was handed in before is not handed in again.
+was handed in before is not handed in again. What waits in the outbox of a run that has ended is
+taken over by the next one: an all-clear that was promised is told.
 """
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import threading
@@ -119,6 +121,8 @@ class Outbox:
         self._changed = threading.Condition()
         self._ended = False
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        # Held for life: nobody else takes over what waits here.
+        self._lock = _locked(folder)
         self._known = deque(self._keys(folder / KNOWN), maxlen=REMEMBERED)
         self._queues = [_Queue(name, sinks[name], folder / name) for name in sinks]
         self._number = 0
@@ -129,6 +133,28 @@ class Outbox:
             threading.Thread(target=self._work, args=(each,), name=each.name, daemon=True)
             for each in self._queues
         ]
+
+    def take_over(self, folder: Path, since: float) -> None:
+        """Take what waits in the outbox of another run, unless that goes on; before `start`.
+
+        Args:
+            folder: That outbox.
+            since: What is older is of no use any more, seconds since 1970.
+        """
+        lock = _locked(folder) if folder != self._folder else None
+        if lock is None:
+            return
+        for queue in self._queues:
+            for path in sorted((folder / queue.name).glob('*.json')):
+                with suppress(OSError, ValueError, KeyError, TypeError):
+                    notification = Notification.from_kept(read_json(path, LARGEST))
+                    if notification.at >= since:
+                        self._number += 1
+                        own = queue.folder / f'{self._number:012d}.json'
+                        _write(own, notification.kept(), self._report)
+                        queue.waiting.append(_Pending(notification, own, self._now()))
+                    path.unlink()
+        os.close(lock)
 
     def start(self) -> None:
         """Begin to deliver."""
@@ -183,6 +209,9 @@ class Outbox:
         for thread in self._threads:
             if thread.is_alive():
                 thread.join(max(0.0, until - time.monotonic()))
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     def deliver_due(self, name: str) -> float | None:
         """Hand over what is due for a sink; return when the next is due, None: nothing waits."""
@@ -293,6 +322,20 @@ class Outbox:
         self._report(f'{path}: damaged: {problem:.100}; it is put aside, the others are told')
         with suppress(OSError):
             keep_aside(path)
+
+
+def _locked(folder: Path) -> int | None:
+    """Return the locked descriptor of an outbox; None: somebody else has it, or it is none."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
 
 
 def _write(path: Path, text: str, report: Callable[[str], object]) -> None:
