@@ -84,12 +84,12 @@ class FindingTeller:
         """Take that one look alone says so, and nobody could look again: nobody is called."""
         if cause_of(finding) not in self._incidents.open():
             self._unverified.add(finding.number)
-            self._begin(finding, f'unverified, seen in one look; {finding.rule}', Severity.WARNING)
+            self._begin(finding, finding.rule, Severity.WARNING)
 
     def _begin(self, finding: Event, why: str, severity: Severity) -> None:
         self._incidents.begin(
             cause_of(finding),
-            f'{finding.words()} ({why})',
+            f'{finding.words()} ({finding.trail()}; {why})',
             severity,
             place=finding.place,
             evidence=tuple(dict.fromkeys((*finding.evidence[:1], *finding.evidence[-1:]))),

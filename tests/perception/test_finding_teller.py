@@ -46,7 +46,7 @@ def test_an_alert_is_an_incident_with_what_was_seen(tmp_path: Path) -> None:
     told.see_door('ajar', 10.0)
     told.see_door('ajar', 20.0, visit=2)
     (begun,) = told.updates
-    assert begun.text == '1: door D1 is ajar in C1 (D1 is shut)'
+    assert begun.text == '1: door D1 is ajar in C1 (sure in one look, 1.00; D1 is shut)'
     assert (begun.place, begun.evidence) == ('C1', ('3_1_a.jpg',))
     assert begun.finding is not None
     assert (begun.finding.number, begun.finding.kind, begun.finding.subject) == (1, 'door', 'D1')
@@ -74,8 +74,11 @@ def test_what_is_unverified_is_a_warning_until_a_second_look(tmp_path: Path) -> 
     (warning,) = told.updates
     assert (warning.severity, 'unverified' in warning.text) == (Severity.WARNING, True)
     assert told.teller.kept(told.book.state())['alerted'] == [], 'nobody was called'
-    told.teller.alert(finding)
+    again = told.book.take(replace(seen, stamp=13.0), severity=3, rule='nobody in E', visit=2)
+    assert again is not None
+    told.teller.alert(again)
     assert [each.severity for each in told.updates] == [Severity.WARNING, Severity.ALARM]
+    assert 'first look 0.82, seen in another visit after 12 s, now 0.97' in told.updates[-1].text
     assert 'unverified' not in told.updates[-1].text
 
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 from indoor_watch.observations import Joined, Kind, Observation
 
@@ -24,6 +24,14 @@ SURE = 0.95
 """A sighting as sure as this needs no second one."""
 ELSEWHERE = 0.5
 """A second look is one from so far from where the first one was, metres."""
+
+
+class _Look(NamedTuple):
+    """One look at an event's thing: which, how sure earlier ones were together, and its surest."""
+
+    look: tuple[int, bool]
+    earlier: float
+    surest: float
 
 
 class EventState(StrEnum):
@@ -49,7 +57,9 @@ class Event:
         began, last: First and last sighting, seconds since 1970.
         sightings: How many observations.
         looks: In how many visits it was seen.
-        confidence: That at least one of its sightings was right.
+        confidence: How likely it is so: of what is called 0.9, nine in ten are (docs/watching.md
+            has what was measured). Sightings from one spot in one visit err together: the surest
+            counts. Those of other visits, or from elsewhere, err each by itself.
         robots: Who saw it.
         evidence: Of the first sighting, the surest and the last one, as far as these differ.
         compared_with: What the last sighting was compared with; or empty.
@@ -57,6 +67,8 @@ class Event:
         confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another visit,
             too.
         sensors: What saw it, of a person.
+        first: The confidence of the first sighting.
+        again: What confirmed it, and when; empty: nothing has, or one sighting was sure.
     """
 
     number: int
@@ -79,6 +91,18 @@ class Event:
     seen_from: tuple[float, float] | None = None
     confirmed: bool = False
     sensors: tuple[str, ...] = ()
+    first: float = 0.0
+    again: str = ''
+
+    def trail(self) -> str:
+        """Say how it was made sure: 'first look 0.82, seen from elsewhere after 14 s, now 0.97'."""
+        by = f' by {" and ".join(self.sensors)}' if self.sensors else ''
+        if self.again:
+            return f'first look {self.first:.2f}, {self.again}, now {self.confidence:.2f}{by}'
+        if self.confirmed:
+            return f'sure in one look, {self.confidence:.2f}{by}'
+        lasted = max(0.0, self.last - self.began)
+        return f'unverified, one look of {lasted:.0f} s, {self.confidence:.2f}{by}'
 
     def words(self) -> str:
         """Return it in words, as '3: door D1 is ajar in C1'."""
@@ -153,6 +177,7 @@ class EventBook:
         self._visits: dict[int, int] = {}
         # Of each event the surest sighting with a picture: how sure, and the picture.
         self._surest: dict[int, tuple[float, str]] = {}
+        self._looked: dict[int, _Look] = {}
         self._quiet: set[int] = set()
 
     @property
@@ -205,14 +230,20 @@ class EventBook:
                 seen.seen_from,
                 seen.confidence >= SURE,
                 (seen.sensor,) if seen.sensor else (),
+                seen.confidence,
             )
             self._next += 1
             self._visits[event.number] = visit
+            self._looked[event.number] = _Look((visit, False), 0.0, seen.confidence)
             self._surest[event.number] = seen.confidence, seen.evidence
             self._keep(event)
             return event
         new_visit = self._visits.get(event.number) != visit
         self._visits[event.number] = visit
+        is_elsewhere = _from_elsewhere(event, seen)
+        how = 'in another visit' if event.looks + new_visit > 1 else 'from elsewhere'
+        is_again = (event.looks + new_visit > 1 or is_elsewhere) and not event.confirmed
+        after = f'seen {how} after {max(0.0, seen.stamp - event.began):.0f} s'
         changed = replace(
             event,
             position=seen.position or event.position,
@@ -223,20 +254,38 @@ class EventBook:
             last=max(event.last, seen.stamp),
             sightings=event.sightings + 1,
             looks=event.looks + new_visit,
-            confidence=1.0 - (1.0 - event.confidence) * (1.0 - seen.confidence),
+            confidence=self._confidence(event, seen, (visit, is_elsewhere)),
             robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
             evidence=self._evidence(event, seen),
             compared_with=seen.compared_with or event.compared_with,
             confirmed=event.confirmed
             or seen.confidence >= SURE
             or event.looks + new_visit > 1
-            or _from_elsewhere(event, seen),
+            or is_elsewhere,
+            again=after if is_again and not event.again else event.again,
             sensors=tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ())))),
         )
         self._events[event.number] = changed
         if changed.state != EventState.OPEN:
             self._index(changed)
         return changed
+
+    def _confidence(self, event: Event, seen: Observation, look: tuple[int, bool]) -> float:
+        """Return how likely an event is so after a further sighting.
+
+        Args:
+            event: As it is.
+            seen: The sighting.
+            look: The visit, and whether it is from elsewhere than the first one.
+        """
+        known = self._looked.get(event.number)
+        if known is None:  # of before a restart
+            known = _Look((-1, False), 0.0, event.confidence)
+        if known.look != look:
+            known = _Look(look, 1.0 - (1.0 - known.earlier) * (1.0 - known.surest), 0.0)
+        known = known._replace(surest=max(known.surest, seen.confidence))
+        self._looked[event.number] = known
+        return 1.0 - (1.0 - known.earlier) * (1.0 - known.surest)
 
     def _evidence(self, event: Event, seen: Observation) -> tuple[str, ...]:
         """Return the pictures of an event that are kept: the first, the surest, the last."""
@@ -329,6 +378,7 @@ class EventBook:
         for each in normal:
             self._normal.setdefault(_key(each), []).append(each)
         self._visits, self._surest, self._quiet = {}, {}, quiet
+        self._looked = {}
         self._current, self._over = {}, []
         for event in events:
             self._index(event)
@@ -355,6 +405,7 @@ class EventBook:
             self._quiet.discard(number)
             self._visits.pop(number, None)
             self._surest.pop(number, None)
+            self._looked.pop(number, None)
             self._current.get(_key(least), set()).discard(number)
 
     def _index(self, event: Event) -> None:

@@ -35,7 +35,7 @@ def test_sightings_of_one_thing_are_one_event():
     assert event is not None
     assert (event.sightings, event.looks, event.robots) == (3, 2, ('Robot1', 'robot2'))
     assert event.evidence == ('a.jpg', 'c.jpg')
-    assert event.confidence == pytest.approx(1 - 0.2**3)
+    assert event.confidence == pytest.approx(1 - 0.2**2), 'of one visit the surest counts'
     assert len(book.events) == len(told) == 1
     take(book, seen(position=(4.0, 2.0)))
     assert len(book.events) == 2
