@@ -490,7 +490,7 @@ def _unfit(line: str) -> str:
     """Return what is wrong with a line for a person; empty: nothing."""
     if not line.isprintable():
         return f'not one line of text: {line!r:.120}'
-    return '' if len(line) < 1000 else f'{len(line)} letters: {line:.80}'
+    return '' if len(line) < 1100 else f'{len(line)} letters: {line:.80}'
 
 
 # --- missions ---

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from strict_files.files import FileError
 from surveillance_runtime.event_log import EventLog, record_in
-from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
+from surveillance_runtime.incidents import Incidents, IncidentUpdate
 
 LAUNCHER = 'launch'
 QUIET_AGAIN = 600.0
@@ -47,7 +47,7 @@ class NodeDeaths:
         name = text.split()[0]
         self._dying[name] = self._now()
         action = f'read the last lines of {name} in the log of the run'
-        self._incidents.begin(('node', name), text, Severity.ALARM, action=action)
+        self._incidents.begin(('node', name), text, action=action)
 
     def restarted(self, name: str, why: str) -> None:
         """Take that a process was started again.

@@ -2,7 +2,8 @@
 
 `survey` makes each node once, in each mode and behaviour, and notes what it declares and offers.
 `write` makes of this the schema that `surveillance_runtime.configuration` checks with,
-docs/parameters.md and docs/interfaces.md; `show` prints parameters for `launch.py params`.
+docs/parameters.md, docs/interfaces.md and docs/alarms.md; `show` prints parameters for
+`launch.py params`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any
 from floor_plans.parameters import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
 from launcher import package_commands
 from launcher.environment import CHECKOUT
-from surveillance_runtime import node_table
+from surveillance_runtime import alarms, node_table
 from surveillance_runtime.configuration import (
     SCHEMA,
     Configuration,
@@ -344,6 +345,7 @@ def write(checkout: Path) -> list[Path]:
     pages = {
         'parameters.md': parameters_page(read_schema()),
         'interfaces.md': interfaces_page(found),
+        'alarms.md': alarms.page(),
     }
     for name, text in pages.items():
         (checkout / 'docs' / name).write_text(text, encoding='utf-8')

@@ -47,7 +47,10 @@ from surveillance_runtime.run_parameters import (
     write_parameters,
 )
 from surveillance_runtime.rviz_layout import fleet_layout
+from surveillance_runtime.stop_request import StopFile, own_file
 
+STOP_KEEPER = 'motion_controller'
+"""Who reads the stop that is kept, besides the collision monitor."""
 NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
@@ -126,6 +129,8 @@ def run_mission(
         log.say(f'deleted {_short(old)}: the runs take more than --keep {run.keep:g} GB')
     if run.network:
         log.say('nodes of other machines are heard: see docs/security.md')
+    for line in stopped_ones(run, team, os.environ):
+        log.warn(line)
     log.say(f'watch it in a second terminal: {watch_command(run)}')
     robots = [part.robot for part in team if part.robot]
     if robots:
@@ -156,6 +161,21 @@ def run_mission(
     if job is None or code not in (0, EXIT_CUT):
         return code
     return job.close(folder) or code
+
+
+def stopped_ones(run: Run, team: Sequence[RobotProcesses], environ: Mapping[str, str]) -> list[str]:
+    """Return a line for each robot that somebody has stopped and nobody has released since."""
+    lines = {}
+    for part in team:
+        if all(node.name != STOP_KEEPER for node in part.everyone):
+            continue
+        kept = own_file(int(ros_domain(run)), part.run.namespace or '/', environ)
+        if (request := StopFile(kept).read()) is not None:
+            robot = part.robot or 'the robot'
+            lines[kept] = (
+                f'{robot} is {request.words()}, not released: it stands until somebody does'
+            )
+    return list(lines.values())
 
 
 def _call_without_alarm(command: str, log: MergedLog, text: str) -> None:

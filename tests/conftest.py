@@ -13,12 +13,14 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import hypothesis
 import pytest
 
+from surveillance_runtime import incidents
 from surveillance_runtime.discovery import launched_nodes
 from surveillance_runtime.testing import claim_domain
 
@@ -270,6 +272,17 @@ def _released() -> Iterator[None]:
     yield
     for kept in _STATE.glob('surveillance/stop_*.json'):
         kept.unlink()
+
+
+@pytest.fixture
+def incidents_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have incidents begin and end without the delays of the table, which are real time."""
+    kind = incidents.alarm_kind
+    monkeypatch.setattr(
+        incidents,
+        'alarm_kind',
+        lambda *cause: replace(kind(*cause), on_delay=0.0, off_delay=0.0),
+    )
 
 
 @pytest.fixture

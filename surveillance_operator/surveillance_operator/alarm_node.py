@@ -38,8 +38,9 @@ from surveillance_interfaces.srv import ConsoleCommand
 from surveillance_ontology.patrol_vocabulary import ROBOT
 from surveillance_operator.notify.calls import Sinks, open_sinks, run_command
 from surveillance_operator.notify.incident_keeper import IncidentKeeper
+from surveillance_operator.notify.machine_watch import MachineWatch
 from surveillance_runtime.incident_topic import TOPIC, IncidentPublisher, hear_incidents
-from surveillance_runtime.incidents import IncidentCall, IncidentUpdate, Severity
+from surveillance_runtime.incidents import IncidentCall, IncidentUpdate
 from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.logging import Allowance
 from surveillance_runtime.node import PatrolNode
@@ -82,6 +83,7 @@ class Alarm(PatrolNode):
         super().__init__('alarm', **node_options)
         self._settings = self.declare_fields(AlarmSettings())
         folder = Path(self._settings.folder) if self._settings.folder else None
+        self._machine = MachineWatch(self.incidents, folder)
         self._sinks = self._open_sinks(folder)
         self._of_others = IncidentPublisher(self)
         self._keeper = IncidentKeeper(
@@ -133,7 +135,7 @@ class Alarm(PatrolNode):
     def _on_trouble(self, sink: str, text: str) -> None:
         """Tell the other sinks of one that does not work; empty: it works."""
         if text:
-            self.incidents.begin(('sink', sink), f'{sink}: {text}', Severity.ALARM)
+            self.incidents.begin(('sink', sink), f'{sink}: {text}')
         else:
             self.incidents.end(('sink', sink), f'{sink} works again')
 
@@ -194,6 +196,7 @@ class Alarm(PatrolNode):
             if now >= look_at:
                 look_at = now + LOOK_PERIOD
                 self._look_for_restarts()
+                self._machine.look()
             due = self._keeper.advance()
             wait = LOOK_PERIOD if due is None else due
         while not self._inbox.empty():

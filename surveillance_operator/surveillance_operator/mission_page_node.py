@@ -78,6 +78,9 @@ class EditablePlace:
     )
 
 
+CONNECTIONS = 'page', 'connections'
+
+
 class MissionPage(PatrolNode):
     """Serves the page."""
 
@@ -158,6 +161,7 @@ class MissionPage(PatrolNode):
                 report=self.get_logger().warning,
                 links=Links(Path(links_file) if links_file else None),
                 pressed=self._presses.write,
+                crowded=self._on_crowd,
             )
         except OSError as error:
             raise NotNowError(str(error)) from error
@@ -187,6 +191,13 @@ class MissionPage(PatrolNode):
 
     def _on_news(self, robot: str, new: MissionState, _told: Sequence[Notice]) -> None:
         self._broadcaster.show(new, robot)
+
+    def _on_crowd(self, is_crowded: bool) -> None:
+        if is_crowded:
+            text = 'the page has as many connections as it may have: the least useful ones end'
+            self.incidents.begin(CONNECTIONS, text)
+        else:
+            self.incidents.end(CONNECTIONS, 'there is room for connections again')
 
     def _picture(self, robot: str) -> bytes | None:
         """Return the newest image of a robot's camera."""

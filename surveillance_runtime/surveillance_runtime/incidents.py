@@ -8,6 +8,9 @@ end.
 
     node.incidents.begin(('door', 'D1'), 'D1 is closed: nothing else leads out of R1')
     node.incidents.end(('door', 'D1'))
+
+What kinds there are, with their severity, delays and what a person is to do, is one table:
+`surveillance_runtime.alarms`.
 """
 
 from __future__ import annotations
@@ -22,14 +25,8 @@ from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-
-class Severity(StrEnum):
-    """How much an incident matters."""
-
-    WARNING = 'warning'
-    """A person should know; nobody is called."""
-    ALARM = 'alarm'
-    """A person is called."""
+from surveillance_runtime.alarms import Severity as Severity
+from surveillance_runtime.alarms import alarm_kind
 
 
 class IncidentPhase(StrEnum):
@@ -205,6 +202,8 @@ class Incidents:
         node: The owner's name.
         robot: Whose node it is; empty: of a run that has no names.
         now: Seconds on the owner's clock.
+        steady: Steady seconds, by which the delays of `alarms.ALARMS` are kept, with `advance`;
+            None: each incident begins and ends at once.
     """
 
     def __init__(
@@ -213,32 +212,49 @@ class Incidents:
         node: str = '',
         robot: str = '',
         now: Callable[[], float] = time.time,
+        steady: Callable[[], float] | None = None,
     ) -> None:
         self._tell = tell
+        self._steady = steady
         self._node, self._robot, self._now = node, robot, now
         # Held while it is told, too: an end that overtakes a change would never be over. Who is
         # told may ask what goes on.
         self._lock = threading.RLock()
         self._open: dict[Cause, IncidentUpdate] = {}
+        # What holds, but not for its on-delay yet; what is away, but not for its off-delay yet.
+        self._coming: dict[Cause, tuple[float, str, Severity, dict[str, Any]]] = {}
+        self._going: dict[Cause, tuple[float, str]] = {}
 
     def begin(
         self,
         cause: tuple[str, str],
         text: str,
-        severity: Severity = Severity.WARNING,
+        severity: Severity | None = None,
         **more: Any,
     ) -> None:
         """Begin an incident; one that goes on gets another text, severity or the like.
 
+        It is told when it has been so for its on-delay.
+
         Args:
             cause: Kind and name, see `Cause`.
             text: One sentence that names the cause.
-            severity: Whether somebody is called.
+            severity: Whether somebody is called; None: as the table says.
             **more: Others of `IncidentUpdate`'s: place, action, acknowledged_by, evidence, finding.
         """
-        about = Cause(*cause)
+        about, kind = Cause(*cause), alarm_kind(*cause)
+        severity = kind.severity if severity is None else severity
         with self._lock:
+            self._going.pop(about, None)
             known = self._open.get(about)
+            if known is None and self._steady is not None and kind.on_delay:
+                since = self._coming.get(about, (self._steady(),))[0]
+                self._coming[about] = since, text, severity, more
+                if self._steady() - since < kind.on_delay:
+                    return
+            self._coming.pop(about, None)
+            if known is None:
+                more.setdefault('action', kind.action)
             if known is None:
                 told = IncidentUpdate(
                     *(
@@ -272,19 +288,53 @@ class Incidents:
         with self._lock:
             known = self._open.get(Cause(*cause))
             if known is not None:
+                going = self._going.get(known.cause)
                 self.begin(cause, known.text, known.severity, acknowledged_by=by)
+                if going is not None:
+                    self._going[known.cause] = going
 
     def end(self, cause: tuple[str, str], text: str = '') -> None:
         """End an incident; nothing happens when there is none.
+
+        It is told when it has been away for its off-delay, and has not begun again.
 
         Args:
             cause: As it began.
             text: What made it end; empty: what it was.
         """
+        about, delay = Cause(*cause), alarm_kind(*cause).off_delay
         with self._lock:
-            begun = self._open.pop(Cause(*cause), None)
-            if begun is not None:
-                self._tell(replace(begun, phase=IncidentPhase.END, text=text or begun.text))
+            self._coming.pop(about, None)
+            if about not in self._open:
+                return
+            if self._steady is not None and delay:
+                at, _ = self._going.get(about, (self._steady() + delay, ''))
+                self._going[about] = at, text
+            else:
+                self._end_now(about, text)
+
+    def _end_now(self, about: Cause, text: str) -> None:
+        self._going.pop(about, None)
+        begun = self._open.pop(about)
+        self._tell(replace(begun, phase=IncidentPhase.END, text=text or begun.text))
+
+    def advance(self) -> None:
+        """Tell what has held, or been away, for long enough; call it about each second."""
+        if self._steady is None:
+            return
+        with self._lock:
+            now = self._steady()
+            for about, (_, text, severity, more) in list(self._coming.items()):
+                self.begin(about, text, severity, **more)
+            for about, (at, text) in list(self._going.items()):
+                if now >= at:
+                    self._end_now(about, text)
+
+    def close(self) -> None:
+        """Tell what is away already as over: nobody will come to tell it."""
+        with self._lock:
+            for about, (_, text) in list(self._going.items()):
+                self._end_now(about, text)
 
     def end_all(self, kind: str, text: str = '') -> None:
         """End all incidents of one kind of cause."""
@@ -292,9 +342,9 @@ class Incidents:
             self.end(cause, text)
 
     def open(self) -> tuple[Cause, ...]:
-        """Return the causes of those that go on."""
+        """Return the causes of those that hold."""
         with self._lock:
-            return tuple(self._open)
+            return tuple(each for each in self._open if each not in self._going)
 
     def updates(self) -> tuple[IncidentUpdate, ...]:
         """Return those that go on, as they were told last."""

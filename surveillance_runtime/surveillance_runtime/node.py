@@ -70,6 +70,8 @@ _FEWER_SERVICES = (Parameter('start_type_description_service', value=False),)
 MOST_WAITING = 200
 """How many requests to one service may wait at a time: rclpy's executor looks at each in each
 round, and one whose client is gone waits as well."""
+INCIDENT_PERIOD = 1.0
+"""Seconds between two looks which incidents have held, or been away, for long enough."""
 JOIN_SECONDS = 2.0
 """How long a stopping node waits for its threads, seconds."""
 
@@ -148,7 +150,10 @@ class PatrolNode(Node):
             name,
             self.get_namespace().rpartition('/')[2],
             lambda: 1e-9 * self.get_clock().now().nanoseconds,
+            time.monotonic,
         )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(INCIDENT_PERIOD, self.incidents.advance, clock=steady)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
 
@@ -439,6 +444,7 @@ class PatrolNode(Node):
             return True
         self.stopping.set()
         self.on_stop()
+        self.incidents.close()
         with self._spawning:
             threads = list(self._threads)
         deadline = time.monotonic() + JOIN_SECONDS

@@ -171,6 +171,7 @@ def test_a_path_that_leads_nowhere_is_a_turn_by_the_shorter_way(
         motion.follow(path, run, lambda _: None)
 
 
+@pytest.mark.usefixtures('incidents_at_once')
 def test_a_robot_that_another_program_sends_is_waited_for(
     graph: Any, servers: Servers, run: Run
 ) -> None:

@@ -386,6 +386,7 @@ def test_markers_count_for_the_picture_that_they_were_read_in(graph, monkeypatch
     assert [numbers for _, numbers in eyes.looked[3:]] == [[16]]
 
 
+@pytest.mark.usefixtures('incidents_at_once')
 def test_pictures_without_a_pose_are_told_once_and_when_that_is_over(graph, monkeypatch):
     eyes = Eyes(graph, monkeypatch)
     node, steady = eyes.node, 0.0

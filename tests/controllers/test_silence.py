@@ -10,12 +10,13 @@ from builtin_interfaces.msg import Time
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from surveillance_runtime.alarms import SILENT_AFTER
 from surveillance_runtime.incidents import Incidents
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing.sensors import REPEATED, OdometryReader
-from surveillance_runtime.sensing.silence import SILENT_AFTER, SensorWatch, SilenceWatch
+from surveillance_runtime.sensing.silence import SensorWatch, SilenceWatch
 from surveillance_runtime.sensing.transforms import ScanReader
 
 

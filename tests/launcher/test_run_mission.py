@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import shlex
 
-from launcher.run import (
-    Run,
-)
+from launcher.fleet_launch import RobotProcesses
+from launcher.run import Run
 from launcher.run_folder import RunState, make_folder, options_of
 from launcher.run_mission import (
     chosen_folder,
+    stopped_ones,
     summary,
     watch_command,
     what_to_look_at,
 )
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_runtime.event_log import record_in
+from surveillance_runtime.node_table import BY_NAME
 from surveillance_runtime.run_files import TIMELINE
+from surveillance_runtime.stop_request import StopFile, StopRequest, own_file
 
 
 def test_the_last_lines_of_a_run_can_be_typed_and_tell_what_could_not_be_written(tmp_path):
@@ -49,6 +51,28 @@ def test_the_hint_to_watch_leads_to_this_run(monkeypatch):
     assert watch_command(named) == 'python3 launch.py watch --domain 7 --namespace robot2'
     monkeypatch.setenv('ROS_DOMAIN_ID', '3')
     assert watch_command(Run()) == 'python3 launch.py watch --domain 3'
+
+
+def test_a_robot_that_was_stopped_is_named_at_the_start(tmp_path):
+    team = [RobotProcesses(run=Run(domain=7), nodes=(), observers=(BY_NAME['motion_controller'],))]
+    environ = {'XDG_STATE_HOME': str(tmp_path)}
+    assert stopped_ones(Run(domain=7), team, environ) == []
+    StopFile(own_file(7, '/', environ)).keep(StopRequest('the guard', '', 1.7e9))
+    (line,) = stopped_ones(Run(domain=7), team, environ)
+    assert line.startswith('the robot is stopped by the guard at ')
+    assert line.endswith(', not released: it stands until somebody does')
+    assert stopped_ones(Run(domain=8), team, environ) == []
+
+
+def test_a_run_whose_state_is_damaged_is_named_at_the_start(tmp_path):
+    old = make_folder(tmp_path)
+    RunState(old, options_of(Run())).end(ended=False)
+    (old / 'run.json').write_text('{"options')
+    folder, how = chosen_folder(Run(), tmp_path, None)
+    assert folder != old
+    assert how == f'{old / "run.json"} is damaged: that run is not gone on with'
+    RunState(folder, options_of(Run())).end()
+    assert chosen_folder(Run(), tmp_path, None)[1] == '', 'it is told once'
 
 
 def test_an_unfinished_run_of_other_options_is_told_at_the_start(tmp_path):

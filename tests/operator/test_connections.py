@@ -43,11 +43,23 @@ def slow() -> Slow:
 
 
 @pytest.fixture
-def page(monkeypatch: pytest.MonkeyPatch, slow: Slow) -> Iterator[Page]:
+def crowds() -> list[bool]:
+    return []
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch, slow: Slow, crowds: list[bool]) -> Iterator[Page]:
     monkeypatch.setattr(server, 'most_connections', lambda: MOST)
     broadcaster = Broadcaster()
     actions: dict[str, Any] = {'stop': stop, 'slow': slow}
-    page = Page(broadcaster, questions={}, actions=actions, port=0, token='secret')
+    page = Page(
+        *(broadcaster,),
+        questions={},
+        actions=actions,
+        port=0,
+        token='secret',
+        crowded=crowds.append,
+    )
     broadcaster.show(MissionState())
     page.start()
     yield page
@@ -82,12 +94,15 @@ def test_more_half_requests_than_connections_leave_room_for_the_stop(page: Page)
         assert ended(half[0])
 
 
-def test_more_viewers_than_connections_leave_room_for_the_stop(page: Page) -> None:
+def test_more_viewers_than_connections_leave_room_for_the_stop(
+    page: Page, crowds: list[bool]
+) -> None:
     words = f'GET /events HTTP/1.1\r\nHost: 127.0.0.1:{page.port}\r\n\r\n'.encode()
     with ExitStack() as peers:
         viewers = [peers.enter_context(connect(page, words)) for _ in range(3 * MOST)]
         assert press(page)[0] == 200
         assert ended(viewers[0])
+        assert crowds[0], 'somebody is told'
 
 
 def test_half_a_request_ends_after_a_while(page: Page, monkeypatch: pytest.MonkeyPatch) -> None:

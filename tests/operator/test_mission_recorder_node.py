@@ -122,6 +122,7 @@ def test_an_image_a_second_is_kept_where_somebody_looks(graph: Any, tmp_path: Pa
     assert not [t for t, _, _ in Messages(folder).in_order() if t in ('/seen', '/unseen')]
 
 
+@pytest.mark.usefixtures('incidents_at_once')
 def test_two_types_on_one_name_are_told_with_both_owners(graph: Any, tmp_path: Path) -> None:
     # The middleware refuses a second type to one participant: the other node is of its own.
     context = rclpy.Context()

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import pytest
+
 from surveillance_runtime.incident_topic import DEPTH, hear_incidents
 from surveillance_runtime.incidents import Cause, IncidentUpdate, SeenThing, Severity
 from surveillance_runtime.node import PatrolNode
@@ -12,6 +14,7 @@ from surveillance_runtime.node import PatrolNode
 DOOR = ('door', 'D1')
 
 
+@pytest.mark.usefixtures('incidents_at_once')
 def test_a_late_listener_is_told_what_goes_on_however_much_was_told(graph: Any) -> None:
     robot = graph.add(partial(PatrolNode, 'observer'))
     seen = SeenThing(3, 'door', 'ajar', 'D1', (1.0, 2.0), 0.5, 'D1 is shut')

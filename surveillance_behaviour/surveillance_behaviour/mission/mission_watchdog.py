@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from surveillance_behaviour.mission.recovery import Failure
-from surveillance_runtime.incidents import Incidents, Severity
+from surveillance_runtime.incidents import Incidents
 
 PATIENCE = 10.0
 """How much longer than its plan explains a mission may be silent, seconds."""
@@ -96,7 +96,7 @@ class MissionWatchdog:
         if seen.waiting:
             if self._help is None:
                 self._help = cause_of(seen.failure, seen.closed)
-            self._incidents.begin(self._help, text_of(seen), Severity.ALARM)
+            self._incidents.begin(self._help, text_of(seen))
         elif self._help is not None and seen.failure is None:
             self._incidents.end(self._help, f'the mission goes on in {seen.place}')
             self._help = None
@@ -111,7 +111,7 @@ class MissionWatchdog:
                     f'the robot is {why_held} in {seen.place or "an unknown place"} and must '
                     f'charge now, at {level}: {seen.must_charge}'
                 )
-                self._incidents.begin(CHARGE, text, Severity.ALARM)
+                self._incidents.begin(CHARGE, text)
         elif self._told_charge:
             self._told_charge = False
             self._incidents.end(CHARGE, 'the robot is on its way, or charges')
@@ -130,7 +130,7 @@ class MissionWatchdog:
         if late and self._looks >= LEAST_LOOKS and PURPOSE not in self._incidents.open():
             where = seen.state or 'the start'
             text = f'nothing has happened for {silent:.0f} s in {where}: {_step(seen)}'
-            self._incidents.begin(PURPOSE, text, Severity.ALARM)
+            self._incidents.begin(PURPOSE, text)
 
 
 def _goes_on(before: MissionSight, seen: MissionSight) -> bool:

@@ -10,9 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import resource
+from collections.abc import Callable
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from surveillance_runtime.alarms import CONNECTIONS_WELL
 
 HEADER_TIME = 5.0
 """Seconds within which the head of a request has to be there."""
@@ -39,6 +42,8 @@ class BoundedConnection(H11Protocol):
 
     most = MOST
     """How many there may be at a time."""
+    crowded: Callable[[bool], object] = staticmethod(lambda _is: None)
+    """Called with True when one makes room for another, with False when there are fewer again."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take a new connection; another one goes where there are too many."""
@@ -85,6 +90,8 @@ class BoundedConnection(H11Protocol):
         """Forget the connection."""
         self._end_in(None)
         super().connection_lost(exc)
+        if len(self.connections) < CONNECTIONS_WELL * self.most:
+            self.crowded(False)
         if self._unread is not None:
             self._unread.cancel()
 
@@ -105,5 +112,6 @@ class BoundedConnection(H11Protocol):
 
     def _make_room(self) -> None:
         """End the least useful of the other connections, the oldest of those."""
+        self.crowded(True)
         others: list[Any] = [each for each in self.connections if each is not self]
         min(others, key=lambda each: (each.use, each._since)).transport.abort()

@@ -134,6 +134,7 @@ class Page:
             told whether what it gives leaves this machine.
         links: Who has links of their own; None: nobody.
         pressed: Told of each action that somebody was allowed.
+        crowded: Told True where a connection made room for another, False where there are fewer.
 
     Raises:
         OSError: The address cannot be used.
@@ -159,6 +160,7 @@ class Page:
         documents: Mapping[str, Action] | None = None,
         links: Links | None = None,
         pressed: Pressed = lambda _who, _action, _fields, _said: None,
+        crowded: Callable[[bool], object] = lambda _is: None,
     ) -> None:
         self._broadcaster = broadcaster
         self._pressed = pressed
@@ -189,7 +191,8 @@ class Page:
         ]
         app = _Guard(Starlette(routes=routes), self._gate.refusal, report)
         _report_for_uvicorn(report)
-        connection = type('Connection', (BoundedConnection,), {'most': most_connections()})
+        bounds = {'most': most_connections(), 'crowded': staticmethod(crowded)}
+        connection = type('Connection', (BoundedConnection,), bounds)
         config = uvicorn.Config(
             app,
             http=connection,

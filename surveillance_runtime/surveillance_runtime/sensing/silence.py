@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from rclpy.clock import Clock, ClockType
 
+from surveillance_runtime.alarms import SILENT_AFTER
 from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.incidents import Incidents, Severity
 from surveillance_runtime.node import PatrolNode
@@ -15,10 +16,6 @@ from surveillance_runtime.profile.check_up import awaited
 from surveillance_runtime.profile.record import Frames, RobotProfile, Topics
 from surveillance_runtime.sensing import conversions
 from surveillance_runtime.sensing.sensors import SensorStream
-
-SILENT_AFTER = 8.0
-"""Seconds of real time without a message of use after which somebody is told; a node that is
-started again is there before."""
 
 
 class SilenceWatch:
