@@ -167,6 +167,7 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
                 'exploration': rules.exploration.get(room),
                 'hours': hours.get(room, ''),
                 'keep_out': room in rules.calendar.keep_out,
+                'sweep': room in rules.swept,
             }
             for room, doors in place.rooms.items()
         },

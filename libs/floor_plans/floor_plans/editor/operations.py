@@ -453,6 +453,14 @@ def set_keep_out(draft: Draft, room: str, on: bool) -> str:
     return f'{room} is {"not " if on else ""}entered'
 
 
+def set_sweep(draft: Draft, room: str, on: bool) -> str:
+    """Have a visit of a room cover all of it, or only its point."""
+    _member('room', room, draft.table('map'))
+    listed = [each for each in draft.described.get('sweep') or () if each != room]
+    draft.put('sweep', [*listed, room] if on else listed)
+    return f'{room} is {"" if on else "not "}swept'
+
+
 def set_text(draft: Draft, key: str, value: str) -> str:
     """Set `quiet_hours`, `time_zone` or `robot_room`."""
     _member('key', key, ('quiet_hours', 'time_zone', 'robot_room'))
@@ -484,7 +492,16 @@ OPERATIONS: Mapping[str, Callable[..., str]] = {
         *(cut, join, take_part, remove_room, rename, move_point),
         *(move_door, set_door, add_door, remove_door),
         *(move_station, add_station, remove_station),
-        *(set_zone, remove_zone, set_rule, set_keep_out, set_text, set_marker, remove_marker),
+        *(
+            set_zone,
+            remove_zone,
+            set_rule,
+            set_keep_out,
+            set_sweep,
+            set_text,
+            set_marker,
+            remove_marker,
+        ),
     )
 }
 """Every change by its name."""

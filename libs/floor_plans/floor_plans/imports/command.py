@@ -58,6 +58,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help='make a room of what is outside of the building, up to the edge of the map',
     )
     parser.add_argument(
+        '--aisles',
+        action='store_true',
+        help='make a place of each aisle of a hall, and of each way before and behind its shelves',
+    )
+    parser.add_argument(
         '--json', action='store_true', help='print what was found for a program, as JSON'
     )
     parser.add_argument(
@@ -88,6 +93,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
                 labels=options.labels,
                 force=options.force,
                 with_outside=options.with_outside,
+                aisles=options.aisles,
                 update=options.update,
                 command=f'{parser.prog} {options.map}',
             )

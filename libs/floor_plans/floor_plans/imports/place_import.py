@@ -23,6 +23,7 @@ from floor_plans.imports.graphs import SUFFIXES, read_graph
 from floor_plans.imports.renewal import renewed
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import LeftOut, Proposal, propose
+from floor_plans.map_rooms.halls import Hall
 from floor_plans.map_rooms.proposal import OUTSIDE
 from floor_plans.occupancy_grid import distance_to
 from floor_plans.occupancy_map import (
@@ -52,6 +53,7 @@ class ImportRequest:
         labels: Where to write the rooms as a picture; None: nowhere.
         force: Whether to write over a place that is there already.
         with_outside: What is outside of the building is a room, too.
+        aisles: The aisles of a hall are places of their own.
         update: The place of an older map of the building, from which rooms keep their names;
             None: there is none.
         command: What a person typed, for the head of the place's file; empty: nothing.
@@ -66,6 +68,7 @@ class ImportRequest:
     labels: Path | None = None
     force: bool = False
     with_outside: bool = False
+    aisles: bool = False
     update: Path | None = None
     command: str = ''
     kept: tuple[Path, ...] = ()
@@ -128,11 +131,24 @@ def import_place(request: ImportRequest) -> ImportReport:
         reference['map_file_resolution'] = building.resolution
     if building.picture is not None:
         request = replace(request, kept=(building.picture,))
-    parameters = proposal.parameters
+    large = proposal.halls(building)
+    # What an older place says of sweeping stays as it is.
+    sweep = {'sweep': list(large)} if large and request.update is None else {}
+    parameters: Mapping[str, Any] = {**proposal.parameters, **sweep}
+    halls = [_hall_in_words(name, hall) for name, hall in large.items()]
     changes: tuple[str, ...] = ()
     if request.update is not None:
         parameters, changes = _updated(request, request.update, building, proposal)
-    return _written(request, proposal, reference, parameters, [*building.notes, *changes])
+    return _written(
+        request, proposal, reference, parameters, [*building.notes, *changes, *halls], large
+    )
+
+
+def _hall_in_words(name: str, hall: Hall) -> str:
+    said = f'{name} is a hall of {hall.area:.0f} m2: a visit sweeps all of it (sweep)'
+    if hall.aisles:
+        said += f'; it has {counted(hall.aisles, "aisle")}, --aisles makes places of them'
+    return said
 
 
 def _updated(
@@ -174,7 +190,13 @@ def _levels_in(path: Path) -> Any:
 
 def _proposed(request: ImportRequest, building: OccupancyMap, doors: Mapping[str, Any]) -> Proposal:
     try:
-        return propose(building, request.radius, doors, with_outside=request.with_outside)
+        return propose(
+            building,
+            request.radius,
+            doors,
+            with_outside=request.with_outside,
+            aisles=request.aisles,
+        )
     except ValueError as error:
         raise ValueError(f'{request.source}: {error}') from None
 
@@ -185,6 +207,7 @@ def _written(
     reference: Mapping[str, object],
     parameters: Mapping[str, Any],
     notes: list[str],
+    large: Mapping[str, Hall] | None = None,
 ) -> ImportReport:
     """Write the place's file and draw it; return what there is to say."""
     out, found = request.place, _found(proposal)
@@ -203,6 +226,10 @@ def _written(
     _draw(request, text, picture, proposal)
     content = {
         **_content(proposal, parameters),
+        'halls': [
+            {'name': name, 'area': hall.area, 'seen': hall.seen, 'aisles': hall.aisles}
+            for name, hall in (large or {}).items()
+        ],
         'notes': notes,
         'place': str(out),
         'drawn': str(picture),

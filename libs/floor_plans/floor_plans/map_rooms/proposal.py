@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.floor_plan import Door, FloorPlan
+from floor_plans.map_rooms.halls import Hall, halls, with_aisles
 from floor_plans.map_rooms.joining import SEPARATE
 from floor_plans.map_rooms.segmentation import (
+    CELL,
     SMALLEST_ROOM,
     Line,
     Segmentation,
@@ -124,6 +126,20 @@ class Proposal:
             found[smaller] = min(found[smaller], found[door])
         return found
 
+    def halls(self, building: OccupancyMap) -> dict[str, Hall]:
+        """Return the rooms that are too large to be seen from their points, by name."""
+        positions = self.parameters['room_positions']
+        # Working cells are 0.05 m, the map's may be a little more or less.
+        scale = (
+            building.cells.shape[1] * building.resolution / self.segmentation.working.cells.shape[1]
+        )
+        own = {
+            name: building.to_own([positions[name][:2]])[0] * (CELL / scale)
+            for name in self.names.values()
+        }
+        points = {name: (float(x), float(y)) for name, (x, y) in own.items()}
+        return halls(self.segmentation, self.names, points)
+
     @property
     def outside(self) -> tuple[int, ...]:
         """Numbers of the parts that are outside of the building."""
@@ -147,6 +163,7 @@ def propose(
     doors: Mapping[str, Line] | None = None,
     *,
     with_outside: bool = False,
+    aisles: bool = False,
 ) -> Proposal:
     """Return a place with the rooms and doors of a map.
 
@@ -155,6 +172,7 @@ def propose(
         radius: Of the robot, metres.
         doors: Doors that are known, by name: each parts two rooms. World frame, metres.
         with_outside: What is outside of the building is a room, too.
+        aisles: The aisles of a hall are places of their own.
 
     Raises:
         ValueError: The robot fits nowhere.
@@ -168,6 +186,7 @@ def propose(
     clearance = distance_to(~free, grid.resolution)
     floor = _Floor(building, radius, known, scale, free, clearance, with_outside)
     found = _without_false_doors(floor, found)
+    found = with_aisles(found) if aisles else found
     for _ in range(found.rooms):
         layout = _laid_out(floor, found)
         pair = layout.one_room or _not_parted(floor, layout)

@@ -164,6 +164,7 @@ const FIELDS = {
       ['exploration', 'Explored for, s (empty: as everywhere)', room.exploration, (value) => ['set_rule', {room: name, key: 'exploration', value}]],
       ['hours', 'Hours, as mon-fri 08:00-18:00', room.hours, (value) => ['set_rule', {room: name, key: 'hours', value}]],
       ['keep_out', 'never entered', room.keep_out, (value) => ['set_keep_out', {room: name, on: value}]],
+      ['sweep', 'a visit covers all of it', room.sweep, (value) => ['set_sweep', {room: name, on: value}]],
       ['x', 'Point x, m', room.point[0], (value) => ['move_point', {room: name, x: value, y: room.point[1]}]],
       ['y', 'Point y, m', room.point[1], (value) => ['move_point', {room: name, x: room.point[0], y: value}]],
       ['remove', 'Remove the room and its doors', null, () => ['remove_room', {room: name}]],
