@@ -14,6 +14,7 @@ import numpy as np
 
 from strict_files.settings import parameter
 from surveillance_runtime.profile.record import BATTERY_SOURCES, BatterySource, voltage_curve
+from surveillance_runtime.profile.truth_check import battery_doubt
 
 _SLACK = 1.2
 """A gauge may say more than full: a TurtleBot3 tells its voltage as a part of the nominal one."""
@@ -114,6 +115,7 @@ class DrivenBattery:
         self.level: float | None = None
         self.charging: bool | None = None
         self._heard = -math.inf
+        self._most = 0.0
         self._not_charging_since: float | None = None
 
     def hear(
@@ -130,6 +132,11 @@ class DrivenBattery:
         Raises:
             ValueError: It tells no charge.
         """
+        self._most = max(self._most, percentage if math.isfinite(percentage) else 0.0)
+        if not self._settings.voltages and (
+            why := battery_doubt(percentage, self._settings.full, most=self._most, voltage=voltage)
+        ):
+            raise ValueError(f'{why}: battery.full in the profile is {self._settings.full:g}')
         self.level = level_from(percentage, voltage, self._settings, present=present)
         self._heard = now
         self.charging = charging

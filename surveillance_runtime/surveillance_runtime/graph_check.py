@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import BatteryState, CameraInfo, Image, LaserScan
 
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.check_up import (
+    BASE_FRAMES,
     Endpoint,
     ExpectedTopic,
     GraphSample,
@@ -24,6 +30,8 @@ from surveillance_runtime.profile.check_up import (
     findings,
 )
 from surveillance_runtime.qos import SENSOR_QOS
+from surveillance_runtime.sensing.conversions import matrix_from
+from surveillance_runtime.sensing.frame_tree import FrameLink, FrameTree, plain
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -91,18 +99,21 @@ class Listener:
     Args:
         node: The node that listens; spun by somebody.
         wanted: The topics.
+        within: What a lidar sees nearer than this is its own robot, metres.
     """
 
-    def __init__(self, node: Node, wanted: Iterable[ExpectedTopic]) -> None:
+    def __init__(self, node: Node, wanted: Iterable[ExpectedTopic], *, within: float = 0.0) -> None:
         self._node = node
         self._wanted = [each for each in wanted if each.heard]
+        self._within = within
         self._subscriptions: dict[str, Subscription] = {}
-        self._times: dict[str, list[float]] = {}
-        self._last: dict[str, tuple[str, float | None]] = {}
-        self._parents: dict[str, str] = {}
+        self._samples: dict[str, TopicListening] = {}
+        self._fixed, self._moving = FrameTree(), FrameTree()
         if TFMessage is not None:
             latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-            node.create_subscription(TFMessage, 'tf_static', self._on_static, latched)
+            take = self._on_transforms
+            node.create_subscription(TFMessage, 'tf_static', partial(take, self._fixed), latched)
+            node.create_subscription(TFMessage, 'tf', partial(take, self._moving), 100)
 
     def look(self) -> GraphSample:
         """Subscribe what is published by now; return what is there and what came so far."""
@@ -116,32 +127,113 @@ class Listener:
                 quality = SENSOR_QOS
                 if each.is_latched and all(end.latched for end in right):
                     quality = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+                sample = self._samples[each.topic] = TopicListening(self._node, self._within)
                 self._subscriptions[each.topic] = self._node.create_subscription(
-                    kind, each.topic, partial(self._hear, each.topic), quality
+                    kind, each.topic, sample.hear, quality
                 )
-        return GraphSample(seen.publishers, seen.subscribers, self._heard(), self._parents)
+        fixed = self._fixed.links
+        doubled = (*self._fixed.doubled.values(), *self._moving.doubled.values())
+        return replace(
+            seen,
+            heard={topic: each.sample() for topic, each in self._samples.items() if each.count},
+            parents={child: link.parent for child, link in fixed.items()},
+            moving={child: link.parent for child, link in self._moving.links.items()},
+            places={child: place for child in fixed if (place := self._place(child)) is not None},
+            doubled=doubled,
+            clashes=tuple(type_clashes(seen).values()),
+            has_clock=bool(seen.publishers.get('/clock')),
+        )
 
-    def _on_static(self, message: Any) -> None:
+    def _place(self, frame: str) -> tuple[float, float, float, bool] | None:
+        found = self._fixed.matrix(frame, lambda at: at.rpartition('/')[2] in BASE_FRAMES)
+        if found is None:
+            return None
+        matrix = found[0]
+        yaw = math.atan2(matrix[1, 0], matrix[0, 0])
+        return float(matrix[0, 3]), float(matrix[1, 3]), yaw, bool(matrix[2, 2] < 0.0)
+
+    def _on_transforms(self, tree: FrameTree, message: Any) -> None:
         for each in message.transforms:
-            child, parent = each.child_frame_id, each.header.frame_id
-            self._parents[child.removeprefix('/')] = parent.removeprefix('/')
+            try:
+                matrix = matrix_from(each.transform)
+            except ValueError:
+                continue
+            tree.take(each.child_frame_id, FrameLink(plain(each.header.frame_id), matrix))
 
-    def _hear(self, topic: str, message: Any) -> None:
-        self._times.setdefault(topic, []).append(time.monotonic())
+
+class TopicListening:
+    """What comes on one topic.
+
+    Args:
+        node: The node that listens, for its clock.
+        within: What a lidar sees nearer than this is its own robot, metres.
+
+    Attributes:
+        count: How many messages came.
+        last: The last one.
+    """
+
+    def __init__(self, node: Node, within: float) -> None:
+        self._node, self._within = node, within
+        self._times: list[float] = []
+        self._ages: list[float] = []
+        self._percentages: list[float] = []
+        self._is_unstamped = False
+        self._jump = 0.0
+        self._repeats = 0
+        self.count = 0
+        self.last: Any = None
+
+    def hear(self, message: Any) -> None:
+        """Take a message."""
+        before, self.last = self.last, message
+        self.count += 1
+        self._times.append(time.monotonic())
         header = getattr(message, 'header', None)
         if header is not None:
             stamp = seconds_of(header.stamp)
             now = self._node.get_clock().now().nanoseconds / 1e9
-            self._last[topic] = header.frame_id, now - stamp if stamp else None
+            self._is_unstamped = not stamp
+            if stamp:
+                self._ages.append(now - stamp)
+        if isinstance(message, BatteryState):
+            self._percentages.append(message.percentage)
+        elif isinstance(message, Odometry) and before is not None:
+            a, b = before.pose.pose.position, message.pose.pose.position
+            self._jump = max(self._jump, math.hypot(b.x - a.x, b.y - a.y))
+        elif isinstance(message, LaserScan) and before is not None:
+            self._repeats = self._repeats + 1 if message.ranges == before.ranges else 0
 
-    def _heard(self) -> dict[str, TopicSample]:
-        found = {}
-        for topic, times in self._times.items():
-            passed = times[-1] - times[0]
-            frame, age = self._last.get(topic, ('', None))
-            rate = (len(times) - 1) / passed if passed > 0 else 0.0
-            found[topic] = TopicSample(len(times), rate, frame, age)
-        return found
+    def sample(self) -> TopicSample:
+        """Return what came so far."""
+        passed = self._times[-1] - self._times[0]
+        rate = (len(self._times) - 1) / passed if passed > 0 else 0.0
+        header = getattr(self.last, 'header', None)
+        age = sorted(self._ages)[len(self._ages) // 2] if self._ages else None
+        frame = '' if header is None else header.frame_id
+        return TopicSample(self.count, rate, frame, age, self._values())
+
+    def _values(self) -> dict[str, Any]:
+        message = self.last
+        values: dict[str, Any] = {'unstamped': self._is_unstamped}
+        if isinstance(message, Odometry):
+            values['child'] = message.child_frame_id
+            values['jumps'] = self._jump if self._jump > 0.3 else 0.0
+        elif isinstance(message, LaserScan) and message.ranges:
+            ranges = np.frombuffer(message.ranges, dtype=np.float32)
+            values['told'] = float((ranges > 0.0).mean())
+            values['near'] = float(((ranges > 0.0) & (ranges < self._within)).mean())
+            values['frozen'] = self._repeats >= 5
+        elif isinstance(message, BatteryState):
+            values['percentages'] = tuple(self._percentages)
+            values['voltage'] = message.voltage
+            values['cells'] = len(message.cell_voltage)
+        elif isinstance(message, CameraInfo):
+            values['focal'] = float(message.k[0])
+            values['size'] = f'{message.width} x {message.height}'
+        elif isinstance(message, Image):
+            values['size'] = f'{message.width} x {message.height}'
+        return values
 
 
 LOOK_PERIOD = 2.0

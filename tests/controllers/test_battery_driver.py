@@ -99,3 +99,21 @@ def test_that_it_does_not_charge_is_told_once_the_dock_had_its_time() -> None:
     assert battery.why_not_charging(50.0, 129.9) is None
     battery.hear(0.5, 11.0, True, 130.0)
     assert battery.why_not_charging(50.0, 200.0) is None
+
+
+def test_a_full_battery_that_is_nearly_empty_by_its_voltage_is_not_believed() -> None:
+    battery = DrivenBattery(DriverSettings())
+    with pytest.raises(ValueError, match=r'says full, and 9.8 V say nearly empty'):
+        battery.hear(1.0, 9.8, None, 0.0)
+    battery.hear(1.0, 12.4, None, 1.0)
+    assert battery.level == 100.0
+
+
+def test_a_driver_that_counts_down_to_one_percent_is_not_full() -> None:
+    battery = DrivenBattery(DriverSettings())
+    for percentage in (3.0, 2.0):
+        with pytest.raises(ValueError, match=r'battery.full: 100'):
+            battery.hear(percentage, math.nan, None, 0.0)
+    with pytest.raises(ValueError, match='has told 3 as well: it tells percent'):
+        battery.hear(1.0, math.nan, None, 1.0)
+    assert battery.level is None

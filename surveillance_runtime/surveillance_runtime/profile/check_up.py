@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from strict_files.suggestions import like
 from surveillance_runtime.profile.record import RobotProfile
@@ -70,13 +71,15 @@ class TopicSample:
         count: How many messages.
         rate: Messages a second; 0 where there were not two.
         frame: Of the last; empty: it has none.
-        age: How old the last one's stamp was when it came, seconds; None: it has none.
+        age: How old their stamps were when they came, the median, seconds; None: they have none.
+        values: What else they say, for `truth_check`.
     """
 
     count: int = 0
     rate: float = 0.0
     frame: str = ''
     age: float | None = None
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -88,12 +91,26 @@ class GraphSample:
         subscribers: By topic.
         heard: By topic.
         parents: On `tf_static`: of each frame the one that it is fixed to.
+        moving: On `tf`: of each frame the one that it is below.
+        places: Of each fixed frame x, y, yaw on the robot, and whether it is upside down.
+        doubled: Which frames two tell of, in words.
+        states: Of each lifecycle node of Nav2 its state.
+        clashes: Which names have two types, in words.
+        footprint: That of Nav2's local costmap, as a list of corners; empty: not known.
+        has_clock: Whether a simulation tells the time.
     """
 
     publishers: Mapping[str, Sequence[Endpoint]] = field(default_factory=dict)
     subscribers: Mapping[str, Sequence[Endpoint]] = field(default_factory=dict)
     heard: Mapping[str, TopicSample] = field(default_factory=dict)
     parents: Mapping[str, str] = field(default_factory=dict)
+    moving: Mapping[str, str] = field(default_factory=dict)
+    places: Mapping[str, tuple[float, float, float, bool]] = field(default_factory=dict)
+    doubled: Sequence[str] = ()
+    states: Mapping[str, str] = field(default_factory=dict)
+    clashes: Sequence[str] = ()
+    footprint: Sequence[Sequence[float]] = ()
+    has_clock: bool = False
 
 
 def named(topic: str, namespace: str = '') -> str:
@@ -170,6 +187,18 @@ def awaited(profile: RobotProfile, namespace: str = '') -> tuple[ExpectedTopic, 
             )
         )
     return tuple(wanted)
+
+
+def looked_at(profile: RobotProfile, namespace: str = '') -> tuple[ExpectedTopic, ...]:
+    """Return what is listened to beside what is awaited: a camera, which not each robot has."""
+    camera = (
+        ('topics.image', profile.topics.image, 'Image'),
+        ('topics.camera_info', profile.topics.camera_info, 'CameraInfo'),
+    )
+    return tuple(
+        ExpectedTopic(key, named(topic, namespace), f'sensor_msgs/{kind}', True, '', False)
+        for key, topic, kind in camera
+    )
 
 
 def findings(wanted: ExpectedTopic, seen: GraphSample, seconds: float) -> Iterator[str]:
