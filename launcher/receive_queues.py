@@ -83,7 +83,7 @@ def descriptors_of(pid: int) -> dict[int, int]:
 
 
 @dataclass
-class _Queue:
+class _Untaken:
     waiting: int
     since: float
 
@@ -92,7 +92,7 @@ class _Queue:
 class _Process:
     inodes: Collection[int] = ()
     looked: float = -SOCKETS_PERIOD
-    queues: dict[int, _Queue] = field(default_factory=dict)
+    queues: dict[int, _Untaken] = field(default_factory=dict)
 
 
 class ReceiveQueues:
@@ -142,7 +142,7 @@ class ReceiveQueues:
                     continue
                 before = process.queues.get(inode)
                 if before is None or not each.waiting or each.waiting < before.waiting:
-                    process.queues[inode] = _Queue(each.waiting, now)
+                    process.queues[inode] = _Untaken(each.waiting, now)
                 else:
                     before.waiting = each.waiting
                     if now >= before.since + DEAF_AFTER:

@@ -48,7 +48,7 @@ from lidar_navigation.geometry import Points, Pose, Scan, composed
 from lidar_navigation.robot_base import robot_deceleration, robot_footprint, robot_radius
 from strict_files.settings import parameter
 from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
-from surveillance_controllers.motion.holding import STOPPED
+from surveillance_controllers.motion.holding import COMMAND, STOPPED
 from surveillance_interfaces.msg import StopRequest as StopRequestMessage
 from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
 from surveillance_runtime.graph_check import endpoints_of
@@ -70,9 +70,9 @@ from surveillance_runtime.stop_keeper import StopKeeper
 from surveillance_runtime.stop_request import OWN, TOPIC, StopFile, StopRequest, own_file
 
 STOP_CAUSE = ('person', 'stop')
-MONITORED = 'cmd_vel_monitored'
-"""Topic that the base listens to."""
 BASE_CAUSE = ('robot', 'base')
+DRIVERS = ('motion_controller', 'explorer')
+"""Nodes of a robot that drive it."""
 SECOND_CAUSE = ('robot', 'second command')
 MOST_TURN = 20.0
 """No base turns faster, rad/s: the bound of every parameter of a turn."""
@@ -180,7 +180,7 @@ class CollisionMonitor(PatrolNode):
         self._stopped_topic = OwnedTopic(self, Bool, STOPPED)
         self._base = CommandPublisher(
             self,
-            MONITORED,
+            COMMAND,
             (*self._lidar.settings.scans, 'cmd_vel'),
             self._settings.deceleration,
             self._warn_of_silence,
@@ -335,13 +335,15 @@ class CollisionMonitor(PatrolNode):
 
     def _look_for_others(self) -> None:
         """Tell who else commands the base: nothing that this node stops holds back such a one."""
-        own = f'{self.get_namespace().rstrip("/")}/{self.get_name()}'
+        space = self.get_namespace().rstrip('/')
+        # Whoever drives tells it to stand, and nothing else (`Hold`).
+        own = {f'{space}/{name}' for name in (self.get_name(), *DRIVERS)}
         others = sorted(
             {
                 'a nameless node' if NAMELESS in name else name
                 for name in publishers_of(self, self._base.topic).values()
             }
-            - {own}
+            - own
         )
         if others:
             self.incidents.begin(

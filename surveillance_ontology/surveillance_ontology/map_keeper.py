@@ -7,6 +7,7 @@ Everything here blocks while the server answers and belongs on a worker thread.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -58,8 +59,8 @@ def extended(place: Place | None, notes: Sequence[RoomNote], robot_room: str) ->
         PlaceError: A note that cannot be used; nothing is taken of any then.
     """
     names = [note.name for note in notes]
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(names).items():
+        if count > 1:
             raise PlaceError(('map', name), 'described twice')
     if not notes and place is None:
         raise PlaceError(('map',), 'no rooms described')

@@ -53,7 +53,7 @@ from surveillance_ontology.patrol_vocabulary import ROBOT, checked_names
 from surveillance_ontology.robot_ontology import RobotOntology
 from surveillance_runtime.conversions import point_from, point_message
 from surveillance_runtime.duplicate_nodes import DuplicateNodeWatch
-from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.node import PatrolNode, report_exception
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.place_changes import TOPIC, described_in_text
 from surveillance_runtime.place_parameters import described_place, described_stations
@@ -324,8 +324,15 @@ class OntologyMapBuilder(PatrolNode):
         return response
 
     def _on_build_map(self, msg: OntologyMap) -> None:
-        notes = [room_note_from_ros(place) for place in msg.places]
-        self._work.put(lambda: self._keeper.extend(notes, msg.robot_room))
+        def extend() -> None:
+            # A stranger's place may be wrong: it costs the message.
+            try:
+                notes = [room_note_from_ros(place) for place in msg.places]
+                self._keeper.extend(notes, msg.robot_room)
+            except ValueError as error:
+                report_exception(error, self, 'ontology_map/build_map')
+
+        self._work.put(extend)
 
     def _on_changes(self, msg: FactChanges) -> None:
         is_own = msg.reference_name == self._reference and msg.sequence

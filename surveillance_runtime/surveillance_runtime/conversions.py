@@ -259,8 +259,22 @@ def _straightened(
     return Grid(drawn, drawn_side, (x + west, y + south))
 
 
+MOST_JOINTS = 100
+"""Joints of an arm at most."""
+
+
 def trajectory_from(message: JointTrajectory) -> tuple[list[str], list[TrajectoryPoint]]:
-    """Return a trajectory's joint names and points."""
+    """Return a trajectory's joint names and points.
+
+    Raises:
+        ValueError: There are more joints than an arm has, or more values than joints.
+    """
+    joints = len(message.joint_names)
+    if joints > MOST_JOINTS:
+        raise ValueError(f'trajectory of {joints} joints: expected at most {MOST_JOINTS}')
+    for point in message.points:
+        if max(len(point.positions), len(point.velocities)) > joints:
+            raise ValueError(f'trajectory: a point has more values than its {joints} joints')
     points = [
         TrajectoryPoint(
             seconds_of(point.time_from_start), tuple(point.positions), tuple(point.velocities)

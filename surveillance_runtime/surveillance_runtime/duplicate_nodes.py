@@ -120,6 +120,10 @@ class DuplicateNodes:
         return max(ages, default=0.0)
 
 
+LONGEST = 16_384
+"""Bytes of what a node of a launch says of itself at most."""
+
+
 class _Ears:
     """Hears the nodes of a ROS domain for a `DuplicateNodes`."""
 
@@ -130,6 +134,8 @@ class _Ears:
         node.create_subscription(DiagnosticArray, TOPIC, self._on_heard, 50, raw=True)
 
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
+        if len(heard) > LONGEST:
+            return  # no node of a launch says so much of itself
         publisher = info.get(SOURCE, b'')
         if publisher not in self._named:
             self._named = publishers_of(self._node, TOPIC)

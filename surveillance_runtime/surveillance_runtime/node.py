@@ -52,6 +52,7 @@ from surveillance_runtime.health import Health
 from surveillance_runtime.incident_topic import IncidentPublisher
 from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
 from surveillance_runtime.logging import CleanLogger
+from surveillance_runtime.message_bounds import MOST_ASKED, check_length, lists_of
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
 
 if TYPE_CHECKING:
@@ -66,6 +67,9 @@ _EMPTY = {
 
 _FEWER_SERVICES = (Parameter('start_type_description_service', value=False),)
 """rcl's service logs what a peer asks for as it came, line breaks too, and no tool needs it."""
+
+_OF_PARAMETERS = ('_parameters', '_parameter_types', '_parameters_atomically')
+"""How the names of a node's own services of its parameters end."""
 
 MOST_WAITING = 200
 """How many requests to one service may wait at a time: rclpy's executor looks at each in each
@@ -309,9 +313,13 @@ class PatrolNode(Node):
         return super().create_publisher(msg_type, topic, *args, **kwargs)
 
     def create_subscription(
-        self, msg_type: Any, topic: str, *args: Any, **kwargs: Any
+        self, msg_type: Any, topic: str, callback: Any, *args: Any, **kwargs: Any
     ) -> Subscription:
-        """Create a subscription as rclpy does; it only warns of a publisher it cannot hear."""
+        """Create a subscription as rclpy does; it only warns of a publisher it cannot hear.
+
+        What a stranger sends may be as long as it likes: a message with an array of too many others
+        is lost (`message_bounds`). Who takes serialized ones looks at their length.
+        """
 
         def on_mismatch(event: QoSRequestedIncompatibleQoSInfo) -> None:
             policy = qos_policy_name_from_kind(event.last_policy_kind)
@@ -323,7 +331,9 @@ class PatrolNode(Node):
             'event_callbacks',
             SubscriptionEventCallbacks(incompatible_qos=on_mismatch, use_default_callbacks=False),
         )
-        return super().create_subscription(msg_type, topic, *args, **kwargs)
+        if lists_of(msg_type) and not kwargs.get('raw'):
+            callback = _bounded(callback, topic)
+        return super().create_subscription(msg_type, topic, callback, *args, **kwargs)
 
     def create_timer(self, *args: Any, **options: Any) -> Timer:
         """Create a timer as rclpy does, but without `use_sim_time` on the steady clock.
@@ -369,6 +379,8 @@ class PatrolNode(Node):
 
         def answer(request: Any, response: Any) -> Any:
             try:
+                if name.endswith(_OF_PARAMETERS):
+                    check_length(request, MOST_ASKED)
                 return callback(request, response)
             except Exception as error:
                 return empty(error, request, response)
@@ -503,6 +515,19 @@ class _LiveRecord:
 
     def changed(self, values: Mapping[str, Any]) -> Any:
         return with_values(self.record, values, self.prefix)
+
+
+def _bounded(callback: Callable[[Any], Any], topic: str) -> Callable[[Any], Any]:
+    """Return a callback that is called with messages of bounded arrays only."""
+
+    def bounded(message: Any) -> Any:
+        try:
+            check_length(message)
+        except ValueError as error:
+            raise ValueError(f'topic {topic}: {error}') from None
+        return callback(message)
+
+    return bounded
 
 
 def report_exception(error: BaseException, node: Node, what: str) -> None:

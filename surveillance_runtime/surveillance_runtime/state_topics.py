@@ -21,6 +21,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.timer import Timer
 
+from surveillance_runtime.message_bounds import check_bytes
 from surveillance_runtime.message_source import SOURCE
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import RUN_NODES
@@ -221,6 +222,10 @@ class StateSubscription(Generic[M]):
         return {each: '' if NAMELESS in name else name for each, name in found.items()}
 
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
+        try:
+            check_bytes(heard, self._kind)
+        except ValueError as error:
+            raise ValueError(f'topic {self._name}: {error}') from None
         if self._is_refused(heard):
             return
         before = self._trust.value

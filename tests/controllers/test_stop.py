@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, TwistStamped
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -189,6 +189,23 @@ def test_while_the_disk_hangs_the_monitor_goes_on(
     finally:
         answers.set()
     graph.until(file.exists)
+
+
+@pytest.mark.parametrize('kind', [Twist, TwistStamped])
+def test_who_drives_tells_the_base_to_stand_while_the_monitor_does_not_answer(
+    graph: Any, kind: Any
+) -> None:
+    told = graph.listen(kind, 'cmd_vel_monitored', 1)
+    hold = Hold(graph.add(PatrolNode, name='motion_controller'))
+    StopButton(graph.add(PatrolNode, name='console')).press(True)
+    graph.until(lambda: len(told) > 2)
+    assert all(getattr(each, 'twist', each) == Twist() for each in told)
+    monitor = graph.add(CollisionMonitor, {'robot.command_type': kind.__name__})
+    graph.until(lambda: hold._taken_by is not None)
+    graph.until(lambda: hold._halting.is_canceled())
+    # It is none that commands the base, too.
+    monitor._look_for_others()
+    assert ('robot', 'second command') not in monitor.incidents.open()
 
 
 def test_a_stop_that_nobody_hears_is_asked_again(graph: Any) -> None:

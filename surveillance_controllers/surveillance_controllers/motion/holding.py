@@ -4,7 +4,8 @@ A stop has two paths. `collision_monitor` lets no command through to the base; w
 robot commands nothing. Each hears the wish itself (topic `stop_requested`), so that one of them may
 be dead. Who drives repeats the wish until the monitor has taken it, also to a monitor that begins
 anew and could keep nothing. Until then it keeps the wish in the file that the monitor reads when it
-begins: whoever drives may die before that.
+begins: whoever drives may die before that. A base that was told to drive a moment ago goes on until
+its own time-out: it is told to stand, past the monitor.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import os
 from collections.abc import Callable
 from typing import Any
 
+from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
@@ -29,6 +32,15 @@ STOPPED = 'stopped'
 """Topic of `collision_monitor`: a person has stopped the robot."""
 PAUSED = 'paused'
 """Topic of `robot_behavior`: its state machine is paused."""
+COMMAND = 'cmd_vel_monitored'
+"""Topic that the base listens to: of `collision_monitor`, or of nobody while that is dead."""
+ALONE_AFTER = 0.1
+"""Seconds of real time after which a wish that the monitor has not taken goes to the base itself;
+and from one such command to the next."""
+_COMMANDS: dict[str, Any] = {
+    'geometry_msgs/msg/Twist': Twist,
+    'geometry_msgs/msg/TwistStamped': TwistStamped,
+}
 REPEAT = 0.5
 """Seconds of real time after which a wish is told again to a monitor that has not taken it."""
 
@@ -72,6 +84,10 @@ class Hold:
         self._timer = node.create_timer(
             REPEAT, self._repeat, clock=steady, autostart=False, callback_group=aside
         )
+        self._node = node
+        self._halt_publisher: Publisher | None = None
+        self._halt_type: Any = Twist
+        self._halting = node.create_timer(ALONE_AFTER, self._halt, clock=steady, autostart=False)
 
     def _on_stopped(self, message: Bool) -> None:
         if message.data:
@@ -84,7 +100,7 @@ class Hold:
         else:
             self._taken_by = None
             if STOPPED in self._reasons:
-                self._timer.reset()
+                self._begin_alone()
 
     def _on_paused(self, message: Bool) -> None:
         self._set(PAUSED, message.data)
@@ -93,7 +109,31 @@ class Hold:
         if STOPPED not in self._reasons:
             self._wish = message
             self._set(STOPPED, True)
-            self._timer.reset()
+            self._begin_alone()
+
+    def _begin_alone(self) -> None:
+        self._timer.reset()
+        self._halting.reset()
+
+    def _halt(self) -> None:
+        """Tell the base to stand, in the type that it expects."""
+        if STOPPED not in self._reasons or self._taken_by is not None:
+            self._halting.cancel()
+            return
+        if self._halt_publisher is None:
+            topic = self._node.resolve_topic_name(COMMAND)
+            for base in self._node.get_subscriptions_info_by_topic(topic):
+                kind = _COMMANDS.get(base.topic_type)
+                if kind is not None:
+                    self._halt_type = kind
+                    self._halt_publisher = self._node.create_publisher(kind, COMMAND, 1)
+                    break
+            else:
+                return  # no base is there
+        command: Any = self._halt_type()
+        if self._halt_type is TwistStamped:
+            command.header.stamp = self._node.get_clock().now().to_msg()
+        self._halt_publisher.publish(command)
 
     async def _on_service(self, request: Any, response: Any) -> Any:
         if request.data:
