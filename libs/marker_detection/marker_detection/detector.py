@@ -45,7 +45,7 @@ from marker_detection.image_sampling import (
     homographies_of,
 )
 from marker_detection.other_families import OtherFamilies
-from marker_detection.preprocessing import PreparedImage, prepare
+from marker_detection.preprocessing import PreparedImage, grey_of, prepare
 from strict_files.settings import converted, parameter
 
 # pixels between the middles of outlines that are one: what the search's masks differ by
@@ -94,6 +94,8 @@ class DetectorSettings:
             unexplained, when its id is known.
         border: Black cells around a marker's code. With two or more, outlines that touch each other
             at their corners are parted, too.
+        inverted: Whether markers with black and white exchanged are looked for as well, as OpenCV's
+            `detectInvertedMarker`; takes twice the time.
     """
 
     dictionary: str = parameter(
@@ -133,6 +135,11 @@ class DetectorSettings:
     unknown_lead: float = parameter(3.0, 'Lead over the second best code, other ids.', 1.0, 100.0)
     border: int = parameter(
         1, "Black cells around a code; Kalibr's AprilGrids have 2.", 1, 4, name='marker_border'
+    )
+    inverted: bool = parameter(
+        False,
+        'Whether markers in white on black are looked for, too; takes twice the time.',
+        name='inverted_markers',
     )
 
     def __post_init__(self) -> None:
@@ -198,7 +205,13 @@ class MarkerDetector:
                 work on it.
         """
         with _opencv_errors():
-            return self._detect(image, expected)
+            found = self._detect(image, expected)
+            if not self.settings.inverted:
+                return found
+            left_out = self.left_out
+            found += self._detect(np.asarray(255 - grey_of(image), np.uint8), expected)
+            self.left_out += left_out
+            return _best(found)
 
     def other_families(self, image: npt.NDArray[np.uint8]) -> dict[str, list[int]]:
         """Return the ids of markers of other dictionaries, by the dictionary.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,6 +16,8 @@ from marker_detection.rotations import quaternion_of
 # in the order that OpenCV's IPPE_SQUARE asks for: clockwise from the top left, y up
 _OUTLINE = np.array([[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, -1.0, 0.0]])
 _CORNER_DEVIATION = 0.15
+# the same over both coordinates: what noise makes of either pose's error
+_NOISE_ERROR = _CORNER_DEVIATION * math.sqrt(2.0)
 _SAME_POSE = 0.02
 # share of the side by which a start may miss the corners and still lead to its own minimum
 _NEAR_START = 0.1
@@ -37,8 +40,8 @@ class MarkerPose:
         reprojection_error: Root mean square over the corners, pixels.
         covariance: (6, 6) of position (m) and of small rotations about the optical frame's axes
             (rad), from the corners' deviation.
-        ambiguity: Error of this pose over that of `other`, 0 to 1: near 1 the marker may as well
-            be tilted the other way.
+        ambiguity: Error of this pose over that of `other`, 0 to 1, both with the noise of corners:
+            from 0.6 on the marker may as well be tilted the other way.
         other: The second pose that explains the corners, the marker tilted the other way; None
             where there is only one.
     """
@@ -95,7 +98,8 @@ def pose_of(corners: Array, size: float, camera: CameraModel) -> MarkerPose | No
     pose = _pose(best, outline, matrix)
     for fit in others:
         if np.linalg.norm(best.rotation - fit.rotation) >= _SAME_POSE:
-            ambiguity = min(1.0, max(best.error, 1e-9) / max(fit.error, 1e-9))
+            ambiguity = math.hypot(best.error, _NOISE_ERROR) / math.hypot(fit.error, _NOISE_ERROR)
+            ambiguity = min(1.0, ambiguity)
             return replace(pose, ambiguity=ambiguity, other=_pose(fit, outline, matrix))
     return pose
 

@@ -483,3 +483,29 @@ def test_corners_of_a_marker_of_ten_pixels_are_not_drawn_outwards():
         truth = np.add(side * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), (left, top)) / 16 - 0.5
         errors.append(np.linalg.norm(seen_at.corners - truth, axis=1).max())
     assert max(errors) < 0.45
+
+
+@pytest.mark.parametrize(('distance', 'degrees'), [(1.0, 0), (2.0, 50), (4.0, 20), (6.0, 0)])
+def test_an_inverted_marker_is_read_where_that_is_asked_for(distance, degrees):
+    panel = Panel(12, distance, math.radians(degrees))
+    plain = seen([panel])
+    inverted = np.asarray(255 - plain, np.uint8)
+    assert 12 not in found(DETECTOR.detect(inverted))
+    both = MarkerDetector(DetectorSettings(known_ids=KNOWN, inverted=True))
+    truth = found(DETECTOR.detect(plain))[12]
+    for image in (inverted, plain):
+        assert found(both.detect(image))[12].corners == pytest.approx(truth.corners, abs=0.3)
+
+
+def test_plain_and_inverted_markers_of_one_image_are_both_read():
+    left, right = Panel(12, 2.0, 0.0, offset=(-150, 0)), Panel(15, 2.0, 0.0, offset=(150, 0))
+    image = seen([left, right])
+    image[:, 320:] = 255 - image[:, 320:]
+    detector = MarkerDetector(DetectorSettings(known_ids=KNOWN, inverted=True))
+    assert set(found(detector.detect(image))) == {12, 15}
+
+
+@pytest.mark.parametrize('backdrop', BUSY)
+def test_busy_textures_show_no_inverted_marker(backdrop):
+    detector = MarkerDetector(DetectorSettings(known_ids=KNOWN, inverted=True))
+    assert not detector.detect(seen([], backdrop=backdrop))
