@@ -700,7 +700,14 @@ class LinkCampaign:
         ]
 
     def _launch(self, host: Host, name: str, nodes: Sequence[str]) -> Launcher:
-        words = ['--network', '--record', str(self._scratch / name), '--only', ','.join(nodes)]
+        words = [
+            '--network',
+            'open',
+            '--record',
+            str(self._scratch / name),
+            '--only',
+            ','.join(nodes),
+        ]
         return Launcher(words, self._domain, self._scratch / f'{name}.log', on=host.words)
 
     def run(self, seconds: float, cuts: int, cut_seconds: float) -> LinkResults:

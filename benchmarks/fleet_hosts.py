@@ -37,7 +37,7 @@ from benchmarks.hosts import Link, Network, may_be_made
 from benchmarks.tables import table
 from surveillance_runtime.discovery import launched_nodes
 
-os.environ |= launched_nodes(os.environ, network=True)
+os.environ |= launched_nodes(os.environ, 'open')
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
@@ -222,7 +222,14 @@ class FleetHosts:
 
     def begin(self, name: str) -> None:
         """Start the programs of a host; those that were killed go on with their run."""
-        words = ['--robots', f'{len(self.robots)}', '--network', '--only', NODES.get(name, name)]
+        words = [
+            '--robots',
+            f'{len(self.robots)}',
+            '--network',
+            'open',
+            '--only',
+            NODES.get(name, name),
+        ]
         words += ['--map', str(PLACE), '--record', str(self.folder / name)]
         words += ['-p', 'use_sim_time:=true', '--domain', str(self._domain)]
         if name == WORLD:

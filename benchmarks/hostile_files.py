@@ -12,7 +12,8 @@ go on without what is damaged. It is a fault if anything else is raised, if it t
 record is continued, another run is found, a robot whose stop cannot be read stays stopped.
 
 The files are made by the project's writers, or taken from the `--run` that a mission left.
-`--missions N` resumes N missions whose folder has three damaged files each, and waits for a visit.
+`--missions N` resumes N missions whose folder has three damaged files each, and waits for a
+decision.
 """
 
 from __future__ import annotations
@@ -81,6 +82,8 @@ from surveillance_simulation.staging import read_script
 
 PATIENCE = 20.0
 """Seconds that reading a damaged file may take; a busy machine takes many times as long."""
+LONG = '25'
+"""Seconds of a mission: enough for the first decision on a busy machine."""
 TOPIC = '/words'
 PLACES = ('C1', 'C2', 'E')
 
@@ -502,7 +505,7 @@ def resumed_missions(count: int, generator: np.random.Generator) -> list[str]:
     with tempfile.TemporaryDirectory(prefix='hostile-') as name:
         runs = Path(name, 'runs')
         environ = {**os.environ, 'XDG_STATE_HOME': str(Path(name, 'state'))}
-        _launch(runs, environ, ['--for', '15'])
+        _launch(runs, environ, ['--for', LONG])
         (first,) = runs.iterdir()
         keep = Path(name, 'keep')
         shutil.copytree(first, keep)
@@ -510,23 +513,25 @@ def resumed_missions(count: int, generator: np.random.Generator) -> list[str]:
             shutil.rmtree(runs)
             shutil.copytree(keep, first)
             files = sorted(
-                path for path in first.rglob('*') if path.is_file() and path.suffix != '.html'
+                path
+                for path in first.rglob('*')
+                if path.is_file() and path.suffix != '.html' and path.parent.name != 'parameters'
             )
             names = []
             for number in generator.choice(len(files), 3, replace=False):
                 data, what = damage(files[number].read_bytes(), generator)
                 files[number].write_bytes(data)
                 names.append(f'{files[number].relative_to(first)} ({what})')
-            said = _launch(runs, environ, ['--for', '15', '--resume', first.name])
+            said = _launch(runs, environ, ['--for', LONG, '--resume', first.name])
             newest = max(runs.iterdir(), key=lambda each: (each / 'launch.log').stat().st_mtime)
             problem = ''
             if 'Traceback' in said:
                 problem = said[said.index('Traceback') :][:1500]
             elif 'no run in' in said or 'not of a run' in said:
-                said = _launch(runs, environ, ['--for', '15'])
+                said = _launch(runs, environ, ['--for', LONG])
                 newest = max(runs.iterdir(), key=lambda each: each.stat().st_mtime)
-            if not problem and 'arrived in' not in said:
-                problem = f'no visit: {said[-600:]}'
+            if not problem and '| decision ' not in said:
+                problem = f'no decision: {said[-600:]}'
             if not problem and not any((newest / 'recording').glob('*.mcap')):
                 problem = 'nothing was recorded'
             print(f'  mission {turn + 1}: {", ".join(names)}: {problem or "goes on"}', flush=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import re
 import shlex
 import shutil
@@ -21,7 +22,7 @@ from launcher.environment import PROGRAM
 from strict_files.files import FileError
 from surveillance_runtime import node_table, parameter_checks
 from surveillance_runtime.command_line import CommandParser, page_address
-from surveillance_runtime.discovery import LAST_DOMAIN
+from surveillance_runtime.discovery import LAST_DOMAIN, problem_of
 from surveillance_runtime.node_table import RESERVED
 from surveillance_runtime.run_options import (
     BUILT_IN_ROBOT,
@@ -229,11 +230,12 @@ class Run:
         metavar='FILE',
         help=OPTIONS['notify'].help,
     )
-    network: bool = _switch(
+    network: str = _option(
         '--network',
-        'talk to nodes on other machines, which can then control the robot (default: only this '
-        'machine)',
-        _PROCESSES,
+        '',
+        group=_PROCESSES,
+        metavar='localhost|NAME.xml|open',
+        help=OPTIONS['network'].help,
     )
     record: str | None = _option(
         '--record',
@@ -293,6 +295,8 @@ class Run:
             )
         if self.domain is not None and not 0 <= self.domain <= LAST_DOMAIN:
             raise ValueError(f'--domain {self.domain}: expected a number from 0 to {LAST_DOMAIN}')
+        if self.network and (problem := problem_of(self.network, os.environ)):
+            raise ValueError(f'--network {problem}')
         if self.place is not None:
             from floor_plans import read_place  # needs a set-up
 

@@ -10,13 +10,15 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import math
 import os
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 from launcher.run import NOT_RECORDED, Run
 from strict_files.regular_files import parse_json
@@ -196,9 +198,22 @@ def run_from(options: Mapping[str, Any]) -> Run:
         for name in values:
             if known[name] == Path | None:
                 values[name] = Path(values[name]) if values[name] else None
+            elif not _fits(values[name], known[name]):
+                raise ValueError(f'--resume: {name}: {values[name]!r:.60} is none of its values')
         return Run(**values)
     except TypeError as error:
         raise ValueError(f'--resume: {error}') from None
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    """Tell whether a value of JSON is one that a field of `Run` may have."""
+    if isinstance(kind, UnionType):
+        return any(_fits(value, each) for each in get_args(kind))
+    if get_origin(kind) is Sequence:
+        return isinstance(value, list | tuple) and all(isinstance(each, str) for each in value)
+    if kind is float:
+        return type(value) in (int, float) and math.isfinite(value)
+    return type(value) is kind
 
 
 def resumed(run: Run, usual: Run, runs: Path, name: str) -> tuple[Run, Path]:

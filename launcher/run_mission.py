@@ -36,6 +36,7 @@ from strict_files.files import FileError
 from surveillance_behaviour.mission import mission_log
 from surveillance_runtime import event_log, node_table
 from surveillance_runtime.configuration import Entry
+from surveillance_runtime.discovery import LOCALHOST, problem_of
 from surveillance_runtime.event_log import record_in
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.profile import remappings
@@ -83,9 +84,11 @@ def run_mission(
 ) -> int:
     """Start the nodes, supervise them to the end, print the summary; return the exit code."""
     run, team = checked(run, config)  # before anything is written
+    if problem := problem_of(run.network, os.environ):
+        raise NotNowError(problem)
     domain = ros_domain(run)
     claims = [held for part in team for held in claim(part.nodes, domain, part.run.namespace)]
-    if run.network:
+    if run.network not in ('', LOCALHOST):
         _look_for_others(run, team)
     if run.record not in (None, NOT_RECORDED):
         runs = Path(run.record)
@@ -127,8 +130,8 @@ def run_mission(
         log.say(how)
     for old in deleted:
         log.say(f'deleted {_short(old)}: the runs take more than --keep {run.keep:g} GB')
-    if run.network:
-        log.say('nodes of other machines are heard: see docs/security.md')
+    if run.network not in ('', LOCALHOST):
+        log.say(f'--network {run.network}: nodes of other machines may be heard, docs/security.md')
     for line in stopped_ones(run, team, os.environ):
         log.warn(line)
     log.say(f'watch it in a second terminal: {watch_command(run)}')

@@ -67,7 +67,7 @@ def node_environ(run: Run, logs: Path | None = None) -> dict[str, str]:
     environ = dict(os.environ)
     if run.domain is not None:
         environ['ROS_DOMAIN_ID'] = str(run.domain)
-    environ |= launched_nodes(environ, network=run.network)
+    environ |= launched_nodes(environ, run.network)
     environ |= ONE_THREAD
     for name in ('NOTIFY_SOCKET', 'WATCHDOG_USEC', 'WATCHDOG_PID'):
         environ.pop(name, None)  # of the launcher alone

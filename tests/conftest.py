@@ -47,7 +47,7 @@ os.environ['XDG_STATE_HOME'] = str(_STATE)
 USER_ENVIRON = dict(os.environ)
 """What a user's shell gives to a command; tests of commands start them with it."""
 # A test machine's neighbours are no part of a test.
-os.environ |= launched_nodes(os.environ, network=False)
+os.environ |= launched_nodes(os.environ)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -10,6 +10,7 @@ The arguments are options of `launch.py` (`surveillance_runtime/run_options.py`)
 from __future__ import annotations
 
 import atexit
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -25,6 +26,7 @@ from floor_plans.fleet import MOST_ROBOTS
 from floor_plans.writing import copy_place
 from launch import LaunchContext, LaunchDescription
 from surveillance_runtime.configuration import Configuration, Entry, Layer
+from surveillance_runtime.discovery import launched_nodes, problem_of
 from surveillance_runtime.event_log import record_in
 from surveillance_runtime.fleet_parts import Choice, TeamPart, team_parts
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
@@ -77,6 +79,8 @@ def start_nodes(context: LaunchContext) -> list[Node]:
             parameters or the place; then no node is started.
     """
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
+    if problem := problem_of(given['network'], os.environ):
+        raise ParameterError(f'network: {problem}')
     mode, behaviour = given['mode'], given['behaviour']
     config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
     robot = read_profile(find_profile(config, given['robot']))
@@ -142,6 +146,7 @@ def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Pa
         *remappings(robot.profile, names, mode),
     ]
     files = write_parameters(folder, part.namespace, merged, part.everyone)
+    environ = launched_nodes(os.environ, given['network'])
     return [
         Node(
             package=node.package,
@@ -151,6 +156,7 @@ def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Pa
             parameters=[str(files[node.name])],
             remappings=renamed,
             ros_arguments=['--log-level', given['log_level']],
+            additional_env=environ,
             output='screen',
             emulate_tty=True,
             respawn=True,

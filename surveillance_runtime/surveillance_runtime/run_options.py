@@ -98,6 +98,13 @@ OPTIONS = {
         RunOption(
             'notify', '', 'whom else to tell: webhooks, MQTT, e-mail, commands (notify.yaml)'
         ),
+        RunOption(
+            'network',
+            '',
+            'what the nodes are open to: localhost; open: the networks of this machine, whose '
+            'other nodes can then control the robot; or NAME.xml, a profile of Fast DDS (default: '
+            "localhost, or what the shell's variables say)",
+        ),
         RunOption('record', '', 'folder for the files of runs'),
         RunOption(
             'watch',

@@ -20,6 +20,7 @@ from launcher.fleet_launch import parts
 from launcher.run import Run
 from launcher.run_configuration import configuration, profile_of
 from strict_files.files import FileError
+from surveillance_runtime import discovery
 from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
 from surveillance_runtime.parameters import ParameterError
@@ -41,6 +42,7 @@ class StartedNode:
     remappings: list[tuple[str, str]]
     ros_arguments: list[str]
     output: str
+    additional_env: dict[str, str]
     emulate_tty: bool
     respawn: bool
     respawn_delay: float
@@ -123,6 +125,16 @@ def test_a_person_is_called_as_with_launch_py(start, tmp_path):
     alarm = nodes['alarm']
     assert (alarm['command'], alarm['notify_file']) == ('blink', given['notify'])
     assert alarm['folder'] == str(tmp_path / 'it')
+
+
+def test_its_nodes_are_open_to_what_launch_py_s_are(start, monkeypatch):
+    for name in discovery.VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    for network in ('', 'localhost', 'open'):
+        for node in start(network=network):
+            assert node.additional_env == discovery.launched_nodes({}, network)
+    with pytest.raises(ValueError, match='network: lokal: expected localhost, open, or a file'):
+        start(network='lokal')
 
 
 def test_a_robot_that_watches_stays_as_long_as_with_launch_py(start, tmp_path):

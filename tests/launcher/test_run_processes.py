@@ -52,15 +52,20 @@ def test_discovery_is_the_machines_own_unless_asked_for(monkeypatch):
     assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
     profile = Path(environ['FASTRTPS_DEFAULT_PROFILES_FILE']).read_text()
     assert '<interfaceWhiteList><address>127.0.0.1</address></interfaceWhiteList>' in profile
-    assert node_environ(Run(network=True))['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SUBNET'
+    assert node_environ(Run(network='open'))['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SUBNET'
     with monkeypatch.context() as other:
         other.setenv('RMW_IMPLEMENTATION', 'rmw_cyclonedds_cpp')
         assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
     assert node_environ(Run())['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'OFF'
+    asked_for = node_environ(Run(network='localhost'))
+    assert asked_for['FASTRTPS_DEFAULT_PROFILES_FILE'].endswith('local_discovery.xml')
+    assert asked_for['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
+    own = node_environ(Run(network='mine.xml'))
+    assert own['FASTRTPS_DEFAULT_PROFILES_FILE'] == str(Path('mine.xml').absolute())
 
 
-@pytest.mark.parametrize('network', [False, True])
+@pytest.mark.parametrize('network', ['', 'localhost', 'open'])
 def test_no_node_uses_shared_memory(monkeypatch, network):
     """What a killed process leaves there hides its successor: it answers nobody."""
     for name in discovery.VARIABLES:

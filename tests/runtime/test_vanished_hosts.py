@@ -53,7 +53,7 @@ def test_a_message_is_sent_at_once_while_other_hosts_have_vanished() -> None:
     environ = {**os.environ, 'ROS_DOMAIN_ID': str(claim_domain()), 'ROS_STATIC_PEERS': gone}
     for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
         environ.pop(name, None)
-    environ |= launched_nodes(environ, network=True)
+    environ |= launched_nodes(environ, 'open')
     listener = None
     try:
         listener = subprocess.Popen(
