@@ -43,6 +43,7 @@ class Steersman:
         self.ambiguous = False
         self.awaits = ()
         self.may_be_in: tuple[str, ...] = ()
+        self.trusted = None
 
     @property
     def is_sure(self) -> bool:
