@@ -1,8 +1,8 @@
 """Motion for `motion_controller` by its own navigation (SIMULATED mode): sensors, navigator, base.
 
-Reads `map`, `door_states`, `odom`, `scan`, `initialpose`, `stopped` and `paused`; commands
-`cmd_vel`; publishes where the robot is (`amcl_pose`) and what stands about that the map does not
-have (`obstacles`). Asks `compute_path` for another path when a drive does not go on.
+Reads `map`, `door_states`, `odom`, `scan`, `initialpose`, `mission_status`, `stopped` and `paused`;
+commands `cmd_vel`; publishes where the robot is (`amcl_pose`) and what stands about that the map
+does not have (`obstacles`). Asks `compute_path` for another path when a drive does not go on.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from surveillance_controllers.motion.goal_execution import GoalExecution
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.pose_reports import PoseReports
-from surveillance_interfaces.msg import DoorStates
+from surveillance_interfaces.msg import DoorStates, MissionStatus
 from surveillance_runtime.conversions import (
     pose_from,
     seconds_of,
@@ -89,10 +89,12 @@ class NavigationMotion:
         self._navigator = navigator or Navigator(
             door_segments(node), guesses=guesses, zones=place_zones(node)
         )
+        self._navigator.robot = robot
         self._door_sight = DoorSight(door_segments(node))
         self._doors_told: OwnedTopic[DoorStates] | None = None
         self._navigator.before_search = self._stand_for_search
         self._stands_for_search = False
+        self._seeks = False
         self._place_told: str | None = None
         self._base = CommandPublisher(
             node,
@@ -126,6 +128,14 @@ class NavigationMotion:
         self._reports = PoseReports(node, self._navigator, self._frames, self._odometry)
         self._lidar.subscribe(self._on_scan)
         node.create_subscription(PoseWithCovarianceStamped, 'initialpose', self._on_initial_pose, 1)
+        StateSubscription(
+            node,
+            MissionStatus,
+            'mission_status',
+            self._on_mission,
+            owner='robot_behavior',
+            only=True,
+        )
         self._watch = SensorWatch(
             node,
             self._frames,
@@ -219,10 +229,15 @@ class NavigationMotion:
         with self._goals.lock:
             self._navigator.set_closed(message.closed)
 
+    def _on_mission(self, message: MissionStatus) -> None:
+        """Take that a mission goes on: then a robot that does not know where it is finds out."""
+        with self._goals.lock:
+            self._navigator.seeks = 'RECHARG' not in message.state.upper()
+
     def _on_hold(self) -> None:
         with self._goals.lock:
             self._navigator.stands = self.hold.active
-            if self.hold.active and self._navigator.task is not None:
+            if self.hold.active and (self._navigator.task is not None or self._seeks):
                 # At once: the next scan may be a tenth of a second away.
                 self._base.command(Velocity())
 
@@ -255,9 +270,11 @@ class NavigationMotion:
             self._base.hear(topic)
             self._stands_for_search = False
             velocity = self._navigator.see(scan, measured, topic)
-            drives = velocity is not None and self._navigator.task is not None
             stands = self._stands_for_search or self._mounts.problem
-            if velocity is not None and drives and not stands:
+            if velocity is None and self._seeks:
+                velocity = Velocity()
+            self._seeks = velocity is not None and self._navigator.task is None
+            if velocity is not None and not stands:
                 self._base.command(velocity.slowed_to(self._mounts.top_speed))
             self._reports.publish_pose(measured, stamp)
             # Not only a scan makes the robot sure: a pose that somebody tells does, too.

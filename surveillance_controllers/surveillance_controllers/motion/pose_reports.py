@@ -124,7 +124,8 @@ class PoseReports:
             why = f'it may be in {here}, at poses that look alike'
         self._node.incidents.begin(
             POSE,
-            f'the robot does not know where it is: {why}; drive it about, or tell its pose on '
-            'initialpose (2D Pose Estimate in RViz)',
+            f'the robot does not know where it is: {why}',
             Severity.ALARM,
+            action='say where it is on the page (Set pose), in RViz (2D Pose Estimate) or on the '
+            'topic initialpose, or drive it about by hand',
         )

@@ -10,7 +10,7 @@ A drive is told the time with each step and never waits itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -153,6 +153,7 @@ class Drive:
         *,
         movers: Sequence[Mover] = (),
         lost: bool = False,
+        search: Callable[[], Velocity | None] | None = None,
         limit: float = math.inf,
     ) -> Velocity:
         """Decide the velocity for the next moment.
@@ -163,6 +164,8 @@ class Drive:
             seen: What the lidar sees, robot's frame, shape (n, 2), metres.
             movers: What moves, robot's frame.
             lost: The pose is not to be trusted; the robot stands still and looks.
+            search: How it moves then so that it sees more; it returns None when it has tried all.
+                None: it looks around.
             limit: Top speed here, m/s.
         """
         dt = 0.0 if self._now is None else max(0.0, now - self._now)
@@ -174,7 +177,7 @@ class Drive:
         if not lost:
             self._lost_since = None
         elif not self.state.ended:
-            return self._while_lost(now, seen, dt)
+            return self._while_lost(now, seen, dt, search)
         if self.state is DriveState.DRIVING:
             return self._drive(now, pose, seen, movers, dt)
         if self.state is DriveState.STOPPING:
@@ -224,7 +227,13 @@ class Drive:
         if self.state is DriveState.ASKING and self._now is not None:
             self._recover(self._now, reason)
 
-    def _while_lost(self, now: float, seen: Points, dt: float) -> Velocity:
+    def _while_lost(
+        self,
+        now: float,
+        seen: Points,
+        dt: float,
+        search: Callable[[], Velocity | None] | None,
+    ) -> Velocity:
         r = self._recovery
         self._mark = self._blocked_since = None
         if self._lost_since is None:
@@ -232,7 +241,11 @@ class Drive:
         lost_for = now - self._lost_since
         if lost_for < r.stand_lost:
             return self._follower.halt(seen, dt)
-        if lost_for < r.stand_lost + r.look_lost:
+        if search is not None:
+            velocity = search()
+            if velocity is not None:
+                return velocity
+        elif lost_for < r.stand_lost + r.look_lost:
             return Velocity(0.0, 0.5)
         self.reason = 'the robot does not know where it is: what it sees is nowhere on the map'
         self.state = DriveState.FAILED

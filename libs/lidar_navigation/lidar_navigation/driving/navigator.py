@@ -19,10 +19,11 @@ from floor_plans.parameters import NO_ZONES
 from floor_plans.shapes import Segment
 from lidar_navigation.driving.driving import Drive, Spin
 from lidar_navigation.driving.obstacle_memory import ObstacleMemory
-from lidar_navigation.driving.path_following import Velocity
+from lidar_navigation.driving.path_following import DriveParameters, Velocity
+from lidar_navigation.driving.relocation import OdometryTrack, Relocation
 from lidar_navigation.geometry import Points, Pose, Scan, composed, in_map, relative
 from lidar_navigation.localisation.localisation import Localiser
-from lidar_navigation.localisation.odometry import OdometryBuffer, joined
+from lidar_navigation.localisation.odometry import ContinuousOdometry, OdometryBuffer, joined
 from lidar_navigation.localisation.place_locator import PlaceLocator
 from lidar_navigation.localisation.tracking import Mover, Tracker
 
@@ -44,6 +45,9 @@ ZONE_REACH = 2.0
 """Keep-out zones within this distance are looked at, metres."""
 SLOWING = 0.5
 """With which the robot slows down before a slow zone, m/s^2; less than its acceleration."""
+SEEK_AFTER, SEEK_AGAIN = 5.0, 60.0
+"""A robot without a task that does not know where it is moves about after this time, seconds; and
+once more so long after it has done so in vain."""
 MOVER_GAP = 0.15
 """Nearer than this to what the map has, a point belongs to nothing that moves, metres."""
 
@@ -63,6 +67,8 @@ class Navigator:
             which it sees nothing else.
         obstacles_changed: Set when the obstacles changed; the reader clears it.
         place: The place the robot is in; None while that is not known.
+        seeks: A robot that has no task and does not know where it is moves about to find out.
+        robot: Its limits, for that.
         trusted: The last scan, from where it was made, and its time, seconds, which never goes
             back; None where that pose is in doubt.
     """
@@ -84,12 +90,19 @@ class Navigator:
         self._tracker = Tracker()
         self._odometry: Pose | None = None
         self._readings = OdometryBuffer()
+        self._continuous = ContinuousOdometry()
+        self._way_here = OdometryTrack()
+        self._here: Pose = (0.0, 0.0, 0.0)
+        self._relocation: Relocation | None = None
+        self._unsure_at: float | None = None
         self._others: dict[str, tuple[Scan, float]] = {}
         self._believed: Pose | None = None
         self._candidate: tuple[str | None, float] | None = None
         self._stamp, self._now = -math.inf, 0.0
         self._stood = 0.0
         self.stands = False
+        self.seeks = False
+        self.robot = DriveParameters()
         self.task: Drive | Spin | None = None
         self.before_search: Callable[[], None] = lambda: None
         self.obstacles_changed = False
@@ -213,6 +226,9 @@ class Navigator:
         if stamp is not None:
             self._readings.add(stamp, odometry)
         self._odometry = odometry
+        self._here = self._continuous.take(odometry, stamp)
+        if self._relocation is None:
+            self._way_here.add(self._here)
         if self._localiser is not None:
             self._localiser.move(odometry, stamp)
 
@@ -266,6 +282,10 @@ class Navigator:
         pose = self._localiser.pose
         is_trusted = self._localiser.plausible and not self._localiser.ambiguous
         self.trusted = (pose, scan, now) if is_trusted else None
+        if self.is_sure:
+            self._relocation = self._unsure_at = None
+        elif self._unsure_at is None:
+            self._unsure_at = now
         if self.stands:
             return None if self.task is None else Velocity()
         if isinstance(self.task, Drive):
@@ -277,11 +297,31 @@ class Navigator:
                 np.concatenate([seen, edges]) if len(edges) else seen,
                 movers=self._movers_near(pose),
                 lost=self._localiser.lost,
+                search=lambda: self._moved_about(now - self._stood, seen),
                 limit=self._zones.speed_limit(pose, SLOWING),
             )
         if isinstance(self.task, Spin):
             return self.task.step(pose[2], now - self._stood)
-        return None
+        return self._sought(now, seen) if self.seeks else None
+
+    def _sought(self, now: float, seen: Points) -> Velocity | None:
+        """Return how a robot without a task moves to find out where it is; None: it need not."""
+        if self._unsure_at is None or now - self._unsure_at < SEEK_AFTER:
+            return None
+        velocity = self._moved_about(now - self._stood, seen)
+        if velocity is None:
+            self._relocation, self._unsure_at = None, now + SEEK_AGAIN - SEEK_AFTER
+            return Velocity()
+        return velocity
+
+    def _moved_about(self, now: float, seen: Points) -> Velocity | None:
+        """Return how a robot moves that does not know where it is; None when all was tried."""
+        if self._relocation is None:
+            # Where it is not to drive, it may be now.
+            may_drive = not self._zones.keep_out
+            self._relocation = Relocation(self._way_here, self.robot, may_drive=may_drive)
+        velocity = self._relocation.step(now, self._here, seen)
+        return None if self._relocation.is_over else velocity
 
     def _passed(self, stamp: float) -> float:
         """Return the time that passed up to a scan, seconds; it never goes back."""
