@@ -46,7 +46,7 @@ class Outcome:
 
 def main(names: list[str]) -> int:
     """Start the scripts, print a line for each, and return the exit code."""
-    scripts = names or [path.name for path in (CHECKOUT / 'benchmarks').glob('*.py')]
+    scripts = names or [path.name for path in (CHECKOUT / 'benchmarks').glob('**/*.py')]
     found = [name for name in scripts if OTHERS.get(name, []) is not None and is_command(name)]
     found.sort(key=lambda name: (LONG.index(name) if name in LONG else len(LONG), name))
     begun, failed = time.monotonic(), []

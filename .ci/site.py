@@ -30,6 +30,7 @@ START = {
     'tutorial.md': 'Tutorial',
     'your_building.md': 'Your building',
     'your_robot.md': 'Your robot',
+    'your_robot_has_nav2.md': 'Your robot has Nav2',
 }
 HOW_TO = ('running', 'explore', 'watching', 'fleet', 'long_runs', 'operator', 'security')
 FROM = ('from_armor', 'from_smach', 'from_yasmin', 'from_patrolling_sim')
