@@ -32,15 +32,19 @@ from strict_files.settings import parameter
 from strict_files.suggestions import nearest
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.desk.alarm_actions import AlarmActions
+from surveillance_operator.desk.documents import DeskDocuments
 from surveillance_operator.desk.live_desk import LiveDesk
+from surveillance_operator.desk.metrics import KIND, metrics
+from surveillance_operator.desk.past_parts import PastParts
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
+from surveillance_operator.hand_driving import HandDriving
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_state import MissionState, Notice
 from surveillance_operator.page.access import Links, Person
 from surveillance_operator.page.broadcaster import Broadcaster
-from surveillance_operator.page.server import Action, Page
+from surveillance_operator.page.server import Action, Document, Page
 from surveillance_operator.place_page.edit_session import EditSession
 from surveillance_operator.polled_subscription import PolledSubscription
 from surveillance_operator.sightings import Sightings
@@ -134,6 +138,9 @@ class MissionPage(PatrolNode):
         self._sightings = Sightings(self, evidence_folder)
         self._broadcaster = Broadcaster()
         self._desk = LiveDesk(Path(folder), self._broadcaster.show_desk) if folder else None
+        self._drivers: dict[str, HandDriving] = {}
+        self._driving_lock = threading.Lock()
+        self._past = PastParts(Path(folder)) if folder else None
         self._presses = PressLog(Path(folder) if folder else None, self.get_logger().warning)
         files = self.declare_fields(EditablePlace())
         self._cameras: dict[str, CameraPictures] = {'': CameraPictures(self)}
@@ -151,14 +158,15 @@ class MissionPage(PatrolNode):
                 actions=(self._offered_actions(session) if control else {})
                 | (session.actions if session else {}),
                 picture=self._picture,
-                evidence=lambda name, robot, leaves: self._sightings.picture(
-                    name, robot, blur=leaves
+                evidence=lambda name, robot, run, leaves: self._sightings.picture(
+                    name, robot, run, blur=leaves
                 ),
                 host=host,
                 port=port,
                 origin=origin,
                 token=_kept_token(token_file),
                 report=self.get_logger().warning,
+                documents=self._documents(),
                 links=Links(Path(links_file) if links_file else None),
                 pressed=self._presses.write,
                 crowded=self._on_crowd,
@@ -251,6 +259,7 @@ class MissionPage(PatrolNode):
             'why_not': why_not,
             'sightings': self._sightings.listed,
             **({} if self._desk is None else self._desk.questions()),
+            **({} if self._past is None else {'past': self._past.past}),
         }
 
     def _offered_actions(self, session: EditSession | None) -> dict[str, Action]:
@@ -271,8 +280,41 @@ class MissionPage(PatrolNode):
             'command': self._of_robots(MissionActions.command),
             'event': self._of_robots(MissionActions.event),
             'fleet': self._tell_fleet,
+            'drive': self._drive,
+            'pose': self._set_pose,
             **self._alarm_actions(),
         }
+
+    def _drive(self, speed: float, turn: float, robot: str = '') -> str:
+        """Drive a robot by hand for the next moment, m/s and rad/s; its mission is paused."""
+        return self._driving(robot).drive(speed, turn)
+
+    def _set_pose(self, x: float, y: float, yaw: float, robot: str = '') -> str:
+        """Tell a robot where it is, metres and radians on the map."""
+        return self._driving(robot).set_pose(x, y, yaw)
+
+    def _driving(self, robot: str) -> HandDriving:
+        actions = self._actions.of(robot)
+        with self._driving_lock:
+            if robot not in self._drivers:
+                self._drivers[robot] = HandDriving(self, lambda: actions.machine('pause'), robot)
+            return self._drivers[robot]
+
+    def _documents(self) -> dict[str, Action]:
+        """Return the files that are made for whoever may look."""
+        desk = self._desk
+        if desk is None:
+            return {'metrics': self._metrics}
+        made = DeskDocuments(desk.index, desk.folder.parent)
+        return {'metrics': self._metrics, **made.all()}
+
+    def _metrics(self) -> Document:
+        """Tell figures of the mission as Prometheus reads them."""
+        now = time.time()
+        open_events = [] if self._desk is None else self._desk.index.open_at(now)
+        states = {name: self._subscriber.state(name) for name in self._subscriber.robots}
+        told = metrics(states, open_events, now, self._broadcaster.viewers)
+        return Document(told.encode(), KIND)
 
     def _alarm_actions(self) -> dict[str, Action]:
         if self._desk is None:

@@ -17,6 +17,7 @@ from surveillance_runtime.state_topics import StateSubscription
 MOST_EVENTS = 2000
 """A message with more is not read."""
 _PICTURE = re.compile(r'\d_\d{13}_[A-Za-z0-9-]{1,60}\.jpg\Z')
+_FOLDER = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}')
 _ANSWERED = ('normal', 'acknowledged', 'false alarm')
 
 
@@ -56,19 +57,21 @@ class Sightings:
             'false': false,
         }
 
-    def picture(self, name: str, robot: str, *, blur: bool) -> bytes | None:
+    def picture(self, name: str, robot: str, run: str = '', *, blur: bool) -> bytes | None:
         """Return one of the observer's pictures as JPEG; None where there is none of that name.
 
         Args:
             name: As an event has it.
             robot: Whose event it is.
+            run: Of which run beside this one; empty: of this one.
             blur: Whether it leaves this machine: then people in it are blurred.
         """
-        is_known = not robot or robot in self._events
-        if self._folder is None or not is_known or not _PICTURE.match(name):
+        is_sound = all(not each or _FOLDER.fullmatch(each) for each in (robot, run))
+        if self._folder is None or not is_sound or not _PICTURE.match(name):
             return None
         # Each robot of a fleet has a folder of its own in that of the run.
-        folder = self._folder.parent / robot / self._folder.name
+        of_run = self._folder.parent.parent / run if run else self._folder.parent
+        folder = of_run / robot / self._folder.name
         try:
             return _shown(folder / name, blur=blur)
         except OSError:

@@ -95,6 +95,10 @@ Pressed = Callable[[Person, str, Mapping[str, Any], str], object]
 """Told of an action: who, its name, its fields, what came of it."""
 
 
+Evidence = Callable[[str, str, str, bool], bytes | None]
+"""Takes the name of a kept picture, its robot, its run, and whether it leaves this machine."""
+
+
 @dataclass(frozen=True)
 class Document:
     """A file that is made when somebody asks for it.
@@ -119,8 +123,7 @@ class Page:
         actions: Done for whoever may act, by name; none without control.
         picture: The image of a robot's camera as JPEG, or None when there is none; of a robot that
             is alone the name is empty.
-        evidence: A kept picture by its name and its robot as JPEG, or None; told whether it leaves
-            this machine.
+        evidence: A kept picture as JPEG, or None.
         host, port: Where to listen; port 0 takes any.
         origin: What browsers know the page by behind a proxy, as ``https://robot.example.org``;
             empty: there is no proxy.
@@ -148,7 +151,7 @@ class Page:
         questions: Mapping[str, Action],
         actions: Mapping[str, Action],
         picture: Callable[[str], bytes | None] = lambda _robot: None,
-        evidence: Callable[[str, str, bool], bytes | None] = lambda _name, _robot, _leaves: None,
+        evidence: Evidence = lambda _name, _robot, _run, _leaves: None,
         host: str = '127.0.0.1',
         port: int = 8080,
         origin: str = '',
@@ -265,7 +268,8 @@ class Page:
             'edit': int(may_edit),
             'imports': int(may_edit and 'import_map' in self._actions),
             'live': int(self._front != name),
-            'watch': int('sightings' in self._questions),
+            'past': int('past' in self._questions),
+            'reports': int('report' in self._documents),
         }
         attributes = ' '.join(f'data-{name}="{value}"' for name, value in shown.items())
         text = text.replace('data-kind=""', attributes)
@@ -297,8 +301,10 @@ class Page:
         return Response(image, media_type='image/jpeg')
 
     async def _evidence(self, request: Request) -> Response:
-        name, robot = request.path_params['name'], request.query_params.get('robot', '')
-        image = await run_in_threadpool(self._evidence_of, name, robot, not self._gate.is_local)
+        name = request.path_params['name']
+        robot, run = (request.query_params.get(each, '') for each in ('robot', 'run'))
+        leaves = not self._gate.is_local
+        image = await run_in_threadpool(self._evidence_of, name, robot, run, leaves)
         if image is None:
             return PlainTextResponse('no such picture', 404)
         return Response(image, media_type='image/jpeg')

@@ -38,27 +38,16 @@ function confirmed(button, label, question) {
 }
 
 export class Control {
-  constructor(state, may) {
+  constructor(state, may, guard = may) {
     this.state = state;
     this.may = may;
+    if (guard) this.stops();
     if (!may) return;
     for (const button of document.querySelectorAll('[data-machine]')) {
       button.addEventListener('click', async () => {
         $(button.dataset.answer ?? 'machine-answer').textContent = (await act('machine', {word: button.dataset.machine})).text;
       });
     }
-    for (const [id, on] of [['stop', true], ['release', false]]) {
-      $(id).addEventListener('click', async () => {
-        $('stop-answer').textContent = (await act('stop', {on})).text;
-      });
-    }
-    // The key stops, wherever one is on the page; not while one types.
-    document.addEventListener('keydown', (event) => {
-      if (event.key.toLowerCase() !== 's' || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-      if (event.target.closest?.('input, select, textarea')) return;
-      const button = event.shiftKey && !$('stop-all').hidden ? $('stop-all') : $('stop');
-      if (!button.hidden) button.click();
-    });
     this.place = select('place', 'Place');
     this.door = select('door', 'Door');
     this.room = select('name', 'Room');
@@ -87,6 +76,22 @@ export class Control {
       this.answer,
     );
     this.controller.addEventListener('change', () => { this.command.value = COMMANDS[this.controller.value]; });
+  }
+
+  // Stop and release, which a guard may, too.
+  stops() {
+    for (const [id, on] of [['stop', true], ['release', false]]) {
+      $(id).addEventListener('click', async () => {
+        $('stop-answer').textContent = (await act('stop', {on})).text;
+      });
+    }
+    // The key stops, wherever one is on the page; not while one types.
+    document.addEventListener('keydown', (event) => {
+      if (event.key.toLowerCase() !== 's' || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+      if (event.target.closest?.('input, select, textarea')) return;
+      const button = event.shiftKey && !$('stop-all').hidden ? $('stop-all') : $('stop');
+      if (!button.hidden) button.click();
+    });
   }
 
   // Buttons: label, action, its fields from the form's, another form that it reads, too, what is asked before. The Enter key in a field is the first button.

@@ -20,6 +20,7 @@ export function age(seconds) {
   const minutes = Math.floor(whole / 60);
   const rest = String(whole % 60).padStart(2, '0');
   if (minutes < 60) return `${minutes}:${rest}`;
+  if (minutes > 2880) return `${Math.floor(minutes / 1440)} days`;
   return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, '0')}:${rest}`;
 }
 

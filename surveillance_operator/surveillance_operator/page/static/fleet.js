@@ -27,7 +27,6 @@ export class Fleet {
   show() {
     const known = names(this.robots).sort((a, b) => !a - !b);
     $('fleet').hidden = this.isOne;
-    $('fleet-link').hidden = this.isOne;
     $('stop-all').hidden = this.isOne || !this.may;
     const alarms = this.isOne ? [] : known.flatMap((name) => (this.robots[name].troubles ?? []).map((text) => `${name || SHARED}: ${text}`));
     this.alarm(alarms);

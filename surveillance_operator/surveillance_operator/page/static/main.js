@@ -8,7 +8,12 @@ import {showHealth} from './health.js';
 import {Control} from './control.js';
 import {Fleet} from './fleet.js';
 import {Replay} from './replay.js';
-import {Watching} from './watching.js';
+import {Alarms} from './alarms.js';
+import {Search} from './search.js';
+import {Shift} from './shift.js';
+import {Drive} from './drive.js';
+import {startPeople} from './people.js';
+import {startViews, open} from './views.js';
 
 const root = document.documentElement;
 const state = {};
@@ -16,12 +21,26 @@ const state = {};
 const robots = {};
 const clock = {now: 0, at: 0, rate: 1, measured: 1};
 const may = root.dataset.control === '1';
+const guard = root.dataset.guard === '1';
 const replaying = root.dataset.kind === 'replay';
 
+// The date, seconds since 1970, as the machine of the mission has it; in a replay that of its moment.
+let behind = 0;
+
+function wall() {
+  return replaying ? state.replay?.time ?? 0 : Date.now() / 1000 + behind;
+}
+
+// What is shown as it was, while a person looks back; what comes meanwhile is told again after that.
+let past = null;
+
 const why = new Why(state);
-const control = new Control(state, may && !replaying);
+const control = new Control(state, may && !replaying, guard && !replaying);
 const map = new MapView($('map'), (place) => { why.choose(place); control.choose(place); }, (point) => control.pick(point));
 const replay = replaying ? new Replay() : null;
+const alarms = new Alarms({may: guard && !replaying, wall, onChoose: (event) => map.lookAt(event.position)});
+const search = new Search({may: guard && !replaying, operator: may && !replaying, wall, jump: replaying ? (at) => { replay.jump(at); open('desk'); } : null});
+map.addLayer('events', alarms.spots);
 const fleet = new Fleet(robots, may && !replaying, look);
 let asked = new URLSearchParams(location.search).get('robot');
 window.mission = {state, robots, now, received: 0};
@@ -38,13 +57,11 @@ export function now() {
   return clock.now + Math.min(passed, 5) * clock.rate;
 }
 
-// Alerts of the observer that nobody has answered; they stand in the head and the title of each robot's page.
-let alerts = 0;
-
-function showAlerts(open, words) {
-  alerts = open;
-  $('alerts').hidden = !open;
-  $('alerts').firstElementChild.textContent = `${open} open ${open === 1 ? 'alert' : 'alerts'}: ${words}`;
+function showDesk(desk) {
+  if (!desk) return;
+  behind = desk.at - Date.now() / 1000;
+  alarms.show(desk);
+  search.muted(desk.mutes);
   header();
 }
 
@@ -59,12 +76,12 @@ function header() {
   const name = shown.robot ? `${shown.robot} · ` : '';
   const begins = fleet.isOne || shown.robot ? `${name}a mission begins` : 'what all robots share';
   set('title', status ? `${name}${status.machine}${mission?.mode ? ' · ' + mission.mode : ''}` : mission?.running ? begins : 'no mission yet');
-  document.title = (alerts ? `(${alerts}) ` : '') + (status ? `${name}${status.place || '?'} · ${status.machine}` : 'Mission');
+  document.title = (alarms.loud.length ? `(${alarms.loud.length}) ` : '') + (status ? `${name}${status.place || '?'} · ${status.machine}` : 'Mission');
   set('stop', shown.robot ? `STOP ${shown.robot}` : 'STOP');
   const none = !fleet.isOne && !shown.robot;
   $('stop').hidden = none;
-  $('pause').hidden = none || !mission?.running || Boolean(state.active?.paused);
-  $('go').hidden = none || !mission?.running || !state.active?.paused;
+  $('pause').hidden = !may || none || !mission?.running || Boolean(state.active?.paused);
+  $('go').hidden = !may || none || !mission?.running || !state.active?.paused;
   set('control-h', shown.robot ? `Control of ${shown.robot}` : 'Control');
   const words = status ? [ended && 'the mission has ended', status.state, status.whereabouts, status.waiting_for_help ? 'waiting for help' : status.text] : [`waiting on ${mission?.where ?? ''}`];
   set('state', words.filter(Boolean).join(' · '));
@@ -132,6 +149,10 @@ const SHOW = {
 };
 
 function receive(message) {
+  if (past) {
+    if (message.p.desk) showDesk(message.p.desk);
+    return;
+  }
   const parts = {...message.p};
   const at = performance.now();
   if (clock.at && !message.whole) {
@@ -155,9 +176,25 @@ function receive(message) {
     state.trail.splice(0, state.trail.length - MOST_TRAIL);
   }
   Object.assign(state, message.p);
+  if (parts.desk) showDesk(parts.desk);
   if (parts.replay) replay?.show(parts.replay);
   for (const [needs, draw] of Object.values(SHOW)) if (needs.some((name) => name in parts)) draw(parts);
   window.mission.received += 1;
+}
+
+function lookBack(found, at) {
+  past = found;
+  document.body.classList.toggle('past', Boolean(found));
+  if (!found) { connect(); return; }
+  const parts = {...found.parts};
+  for (const name of Object.keys(state)) if (name !== 'desk') delete state[name];
+  Object.assign(state, parts);
+  clock.now = found.now;
+  clock.at = performance.now();
+  clock.rate = 0;
+  connection('wait', `as it was at ${timeOfDay(at)}`);
+  const all = Object.fromEntries([...MAP_PARTS, ...Object.values(SHOW).flatMap(([needs]) => needs)].map((name) => [name, true]));
+  for (const [, draw] of Object.values(SHOW)) draw(all);
 }
 
 function connection(kind, text) {
@@ -177,7 +214,7 @@ function connect() {
   source = new EventSource(asked === null ? '/events' : `/events?robot=${encodeURIComponent(asked)}`);
   source.onmessage = (event) => {
     heard = performance.now();
-    connection('on', replaying ? 'replay' : 'live');
+    if (!past) connection('on', replaying ? 'replay' : 'live');
     receive(JSON.parse(event.data));
   };
   source.onerror = () => {
@@ -195,7 +232,7 @@ function listen() {
 function camera() {
   const image = $('camera');
   const box = $('camera-section').getBoundingClientRect();
-  if (document.hidden || box.top > innerHeight || box.bottom < 0) return;
+  if (document.hidden || past || !box.height || box.top > innerHeight || box.bottom < 0) return;
   const next = new Image();
   const show = (there) => { image.hidden = !there; $('no-camera').hidden = there; };
   next.onload = () => { image.src = next.src; show(true); };
@@ -207,8 +244,14 @@ $('edit-link').hidden = root.dataset.edit !== '1';
 document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.control')) each.hidden = !may || replaying;
+for (const each of document.querySelectorAll('.guard')) each.hidden = !guard || replaying;
 present();
 connect();
-setInterval(() => { listen(); map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
+setInterval(() => { listen(); alarms.tick(); if (!past) map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);
-if (root.dataset.watch === '1') new Watching(may, now, showAlerts);
+if (root.dataset.past === '1') new Shift({wall, past: lookBack, choose: (event) => { open('events'); search.show(event); }});
+if (may && !replaying) {
+  new Drive(map);
+  startPeople();
+}
+startViews();

@@ -1,7 +1,10 @@
 // The map: what the robot knows of the place, and what it does there. Metres; y points up.
-import {s, colour, names, short, shown, wait} from './dom.js';
+import {h, s, colour, names, short, shown, wait} from './dom.js';
 
-const LAYERS = ['regions', 'grid', 'zones', 'links', 'driven', 'plans', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'stations', 'places', 'others', 'fleet', 'robot'];
+// What a person can hide, and the groups that it is drawn in.
+const SHOWN = {visits: ['regions'], doors: ['doors'], events: ['events'], zones: ['zones', 'stations'], traffic: ['driven', 'plans', 'plan', 'fleet', 'others'], lidar: ['lidar', 'obstacles'], markers: ['markers'], coverage: ['coverage']};
+const MOST_ZOOM = 30, STEP = 1.25, MOVED = 5;
+const LAYERS = ['regions', 'grid', 'zones', 'links', 'driven', 'plans', 'plan', 'doors', 'lidar', 'obstacles', 'markers', 'stations', 'places', 'coverage', 'events', 'others', 'fleet', 'robot', 'aim'];
 // A dock, open to the side that the robot comes from.
 const STATION = 'M.25 -.3H-.3V.3H.25';
 const ROBOT = 'M.55 0L-.35 .38L-.15 0L-.35 -.38Z';
@@ -26,10 +29,174 @@ export class MapView {
     this.robot = s('g', {class: 'robot', visibility: 'hidden'}, s('title', {}, 'the robot'), s('path', {d: ROBOT}));
     this.fleet = new Map();
     for (const name of ['driven', 'plan', 'lidar', 'robot']) this.layers[name].append(this[name]);
-    svg.addEventListener('click', (event) => {
-      const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-      onPoint([Math.round(at.x * 100) / 100, Math.round(-at.y * 100) / 100]);
+    this.zoom = 1;
+    this.centre = null;
+    this.following = false;
+    this.fingers = new Map();
+    svg.addEventListener('click', (event) => { if (!this.dragged) onPoint(this.at(event)); });
+    svg.addEventListener('wheel', (event) => { event.preventDefault(); this.zoomBy(event.deltaY < 0 ? STEP : 1 / STEP, this.at(event)); }, {passive: false});
+    svg.addEventListener('pointerdown', (event) => this.down(event));
+    svg.addEventListener('pointermove', (event) => this.move(event));
+    for (const end of ['pointerup', 'pointercancel']) svg.addEventListener(end, (event) => this.up(event));
+    svg.addEventListener('keydown', (event) => this.key(event));
+    for (const button of document.querySelectorAll('[data-zoom]')) button.addEventListener('click', () => this.press(button.dataset.zoom));
+    document.getElementById('follow').addEventListener('click', () => this.follow(!this.following));
+    this.offer();
+  }
+
+  // Where on the map a pointer is, metres.
+  at(event) {
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(this.svg.getScreenCTM().inverse());
+    return [Math.round(at.x * 100) / 100, Math.round(-at.y * 100) / 100];
+  }
+
+  addLayer(name, group) {
+    this.layers[name].append(group);
+  }
+
+  // A box for each layer; what is hidden stays so in this browser.
+  offer() {
+    const hidden = new Set(JSON.parse(localStorage.getItem('hidden layers') ?? '["coverage"]'));
+    const apply = () => { for (const [name, groups] of Object.entries(SHOWN)) for (const group of groups) this.layers[group].style.display = hidden.has(name) ? 'none' : ''; };
+    document.getElementById('layers').replaceChildren(...Object.keys(SHOWN).map((name) => h('label', {class: 'check'}, h('input', {type: 'checkbox', checked: !hidden.has(name), 'data-layer': name, onchange: (event) => {
+      if (event.target.checked) hidden.delete(name); else hidden.add(name);
+      localStorage.setItem('hidden layers', JSON.stringify([...hidden]));
+      apply();
+    }}), name)));
+    apply();
+  }
+
+  press(word) {
+    if (word === 'whole') { this.follow(false); this.zoom = 1; this.centre = null; this.look(); } else this.zoomBy(word === 'in' ? STEP : 1 / STEP);
+  }
+
+  key(event) {
+    const ways = {ArrowLeft: [-.2, 0], ArrowRight: [.2, 0], ArrowUp: [0, .2], ArrowDown: [0, -.2]};
+    if (event.key === '+' || event.key === '=') this.zoomBy(STEP);
+    else if (event.key === '-') this.zoomBy(1 / STEP);
+    else if (event.key === '0') this.press('whole');
+    else if (event.key === 'f') this.follow(!this.following);
+    else if (ways[event.key] && this.box) { const [dx, dy] = ways[event.key]; this.pan(dx * this.box[2] / this.zoom, dy * this.box[3] / this.zoom); } else return;
+    event.preventDefault();
+  }
+
+  // Zooms about a point of the map, which stays where it is on the screen.
+  zoomBy(factor, about = null) {
+    if (!this.box) return;
+    const before = this.zoom;
+    this.zoom = Math.max(1, Math.min(MOST_ZOOM, before * factor));
+    const [x, y] = this.middle();
+    const [ax, ay] = about ?? [x, y];
+    const share = before / this.zoom;
+    this.centre = [ax + (x - ax) * share, ay + (y - ay) * share];
+    this.look();
+  }
+
+  pan(dx, dy) {
+    const [x, y] = this.middle();
+    this.follow(false);
+    this.centre = [x + dx, y + dy];
+    this.look();
+  }
+
+  middle() {
+    const [x, y, width, height] = this.box;
+    return this.centre ?? [x + width / 2, -(y + height / 2)];
+  }
+
+  follow(on) {
+    this.following = on;
+    document.getElementById('follow').setAttribute('aria-pressed', String(on));
+    if (on && this.zoom < 2) this.zoom = 3;
+    if (on && this.where) this.centre = this.where.slice(0, 2);
+    this.look();
+  }
+
+  lookAt(point) {
+    if (!point || this.zoom === 1) return;
+    this.follow(false);
+    this.centre = point;
+    this.look();
+  }
+
+  // Shows what was chosen of the place; its middle stays within it.
+  look() {
+    if (!this.box) return;
+    const [x, y, width, height] = this.box;
+    const w = width / this.zoom, t = height / this.zoom;
+    const [cx, cy] = this.zoom === 1 ? [x + width / 2, -(y + height / 2)] : this.middle();
+    this.centre = this.zoom === 1 ? null : [Math.max(x, Math.min(x + width, cx)), Math.max(-y - height, Math.min(-y, cy))];
+    const [mx, my] = this.centre ?? [cx, cy];
+    this.svg.setAttribute('viewBox', `${mx - w / 2} ${-my - t / 2} ${w} ${t}`);
+    this.svg.style.setProperty('--near', (this.zoom ** -.6).toFixed(3));
+    this.svg.classList.toggle('zoomed', this.zoom > 1);
+    this.declutter();
+  }
+
+  // Of names that would cover each other the first one stays: rooms before doors before markers.
+  declutter() {
+    cancelAnimationFrame(this.tidy);
+    this.tidy = requestAnimationFrame(() => {
+      const taken = [];
+      for (const text of this.svg.querySelectorAll('.room text, .door-name, text.tag, .share')) {
+        text.classList.remove('covered');
+        const box = text.getBoundingClientRect();
+        if (!box.width) continue;
+        const covered = taken.some((each) => each.left < box.right - 1 && each.right > box.left + 1 && each.top < box.bottom - 1 && each.bottom > box.top + 1);
+        if (covered && !text.closest('.room')) text.classList.add('covered'); else taken.push(box);
+      }
     });
+  }
+
+  // A pose is asked for: a press is where, a drag is where to.
+  aim(hint, done) {
+    this.aiming = done;
+    document.getElementById('map-hint').textContent = hint;
+    this.svg.scrollIntoView({block: 'nearest'});
+  }
+
+  down(event) {
+    this.dragged = false;
+    this.fingers.set(event.pointerId, event);
+    this.from = {event, centre: this.box ? this.middle() : null, at: this.at(event)};
+    if (this.aiming || this.zoom > 1) this.svg.setPointerCapture(event.pointerId);
+  }
+
+  move(event) {
+    if (!this.fingers.has(event.pointerId) || !this.from) return;
+    const before = this.fingers.get(event.pointerId);
+    const far = Math.hypot(event.clientX - this.from.event.clientX, event.clientY - this.from.event.clientY) > MOVED;
+    if (this.fingers.size === 2) {
+      const [a, b] = [...this.fingers.values()];
+      const other = a.pointerId === event.pointerId ? b : a;
+      const gap = (one) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+      if (gap(before) > 0) this.zoomBy(gap(event) / gap(before), this.at(event));
+      this.dragged = true;
+    } else if (this.aiming) {
+      this.drawAim(this.from.at, this.at(event));
+    } else if (far && this.zoom > 1) {
+      const scale = this.svg.getScreenCTM().a;
+      this.dragged = true;
+      this.pan(-(event.clientX - before.clientX) / scale, (event.clientY - before.clientY) / scale);
+    }
+    this.fingers.set(event.pointerId, event);
+  }
+
+  up(event) {
+    if (this.aiming && this.from && event.type === 'pointerup') {
+      const [x, y] = this.from.at, [tx, ty] = this.at(event);
+      const done = this.aiming;
+      this.aiming = null;
+      this.dragged = true;
+      document.getElementById('map-hint').textContent = '';
+      this.layers.aim.replaceChildren();
+      done([x, y, Math.round(1000 * Math.atan2(ty - y, tx - x)) / 1000]);
+    }
+    this.fingers.delete(event.pointerId);
+  }
+
+  drawAim([x, y], [tx, ty]) {
+    this.layers.aim.replaceChildren(s('path', {class: 'aim', d: line([[x, y], [tx, ty]])}), s('circle', {class: 'aim', cx: x, cy: -y, r: .2}));
   }
 
   show(state, parts, now, robots = {}) {
@@ -49,6 +216,16 @@ export class MapView {
     if (came('others')) this.drawOthers(state.others);
     if (came('pose', 'robots') || (came('status') && !state.pose)) this.drawRobot(state);
     if (came('robots', 'pose', 'status')) this.drawFleet(robots, state.places);
+    if (came('coverage', 'places', 'regions')) this.drawCoverage(state);
+    if (came('places', 'doors', 'markers', 'grid', 'robots')) this.declutter();
+  }
+
+  // Which part of each room's floor the last look there saw.
+  drawCoverage({coverage, places, regions}) {
+    this.layers.coverage.replaceChildren(...Object.entries(coverage ?? {}).flatMap(([name, share]) => {
+      const at = regions?.[name]?.label ?? places?.[name]?.at;
+      return at ? [s('text', {class: 'share', x: at[0], y: -at[1] + 1.6, 'font-size': .6}, `${Math.round(100 * share)} % seen`)] : [];
+    }));
   }
 
   // Each robot of a fleet in its colour, with its name and its planned way; the one that is looked at is drawn whole.
@@ -102,7 +279,8 @@ export class MapView {
     const [left, bottom, right, top] = box;
     this.width = right - left;
     this.top = top;
-    this.svg.setAttribute('viewBox', `${left - .3} ${-top - .3} ${right - left + .6} ${top - bottom + .6}`);
+    this.box = [left - .3, -top - .3, right - left + .6, top - bottom + .6];
+    this.look();
   }
 
   drawLinks({grid, links, places}) {
@@ -161,7 +339,9 @@ export class MapView {
   drawRobot({pose, places, status}) {
     const at = pose ?? places?.[status?.place]?.at;
     this.robot.setAttribute('visibility', at ? 'visible' : 'hidden');
+    this.where = at;
     if (at) placeAt(this.robot, at);
+    if (at && this.following) { this.centre = at.slice(0, 2); this.look(); }
   }
 
   drawPlaces(state, now) {

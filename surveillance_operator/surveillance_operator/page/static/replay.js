@@ -18,8 +18,14 @@ export class Replay {
     });
   }
 
+  // Goes to a moment, seconds since 1970.
+  jump(at) {
+    act('seek', {to: Math.max(0, at - (this.begin ?? at))});
+  }
+
   show({at, length, playing, speed, time, read}) {
     this.playing = playing;
+    this.begin = time - at;
     $('play').textContent = playing ? 'Pause' : 'Play';
     $('slider').max = length;
     if (!this.dragging) $('slider').value = at;
