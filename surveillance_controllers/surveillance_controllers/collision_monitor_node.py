@@ -3,7 +3,9 @@
 It stands between whoever commands `cmd_vel` (`motion_controller`, a joystick, any other program)
 and the base, which listens to `cmd_vel_monitored`. A command is slowed down so that the robot can
 brake before the nearest thing on its arc; without a fresh scan, or without a fresh command, the
-robot stands. As a process of its own it also stops a robot whose controller hangs.
+robot stands. What a person commands by hand (`cmd_vel_manual`, of the page) comes before
+`cmd_vel` while it lasts, and is limited alike. As a process of its own the monitor also stops a
+robot whose controller hangs.
 
 Keep-out zones stand in the way as walls do, and in slow zones the speed is theirs, as long as
 somebody tells where the robot is (`amcl_pose`).
@@ -21,6 +23,7 @@ from __future__ import annotations
 
 import math
 import os
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,6 +73,8 @@ from surveillance_runtime.stop_keeper import StopKeeper
 from surveillance_runtime.stop_request import OWN, TOPIC, StopFile, StopRequest, own_file
 
 STOP_CAUSE = ('person', 'stop')
+MANUAL, MANUAL_SECONDS = 'cmd_vel_manual', 0.5
+"""Topic of commands by hand, and for how long one keeps others out, seconds of real time."""
 BASE_CAUSE = ('robot', 'base')
 DRIVERS = ('motion_controller', 'explorer')
 """Nodes of a robot that drive it."""
@@ -174,6 +179,7 @@ class CollisionMonitor(PatrolNode):
         self._seen: dict[str, Scan] = {}
         self._lidars: dict[str, list[str]] = {}
         self._is_held_back = False
+        self._manual_until = -math.inf
         files = [StopFile(each) for each in self._kept_in(self._settings.state_file)]
         self._keeper = StopKeeper(self, *files)
         self._stop = next(filter(None, (each.read() for each in files)), None)
@@ -188,6 +194,7 @@ class CollisionMonitor(PatrolNode):
             frames.base,
         )
         self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        self.create_subscription(Twist, MANUAL, self._on_manual, 1)
         self._lidar.subscribe(self._on_scan)
         StateSubscription(
             self,
@@ -215,7 +222,15 @@ class CollisionMonitor(PatrolNode):
             return [own]
         return [Path(name).expanduser(), own] if name else [None]
 
+    def _on_manual(self, message: Twist) -> None:
+        self._manual_until = time.monotonic() + MANUAL_SECONDS
+        self._take_command(message)
+
     def _on_command(self, message: Twist) -> None:
+        if time.monotonic() >= self._manual_until:
+            self._take_command(message)
+
+    def _take_command(self, message: Twist) -> None:
         speed, turn = message.linear.x, message.angular.z
         if not (math.isfinite(speed) and math.isfinite(turn)):
             self.get_logger().error(f'cmd_vel: {speed} m/s, {turn} rad/s: expected finite numbers')

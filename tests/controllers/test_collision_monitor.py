@@ -176,3 +176,29 @@ def test_a_long_robot_whose_corners_swing_out_turns_slower() -> None:
     slow = collision_monitor_node.allowed(Velocity(0.3, 1.5), beside, settings)
     assert slow.speed < 0.25
     assert slow.turn == pytest.approx(5 * slow.speed)
+
+
+def test_a_hand_comes_before_all_others_and_is_limited_alike(graph: Any) -> None:
+    graph.add(CollisionMonitor)
+    told = graph.listen(Twist, 'cmd_vel_monitored', 1)
+    others = graph.node.create_publisher(Twist, 'cmd_vel', 1)
+    hand = graph.node.create_publisher(Twist, 'cmd_vel_manual', 1)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    other, mine = Twist(), Twist()
+    other.linear.x, mine.linear.x = 0.5, 0.2
+
+    def passes(gap: float, *, held: bool) -> Any:
+        scans.publish(
+            LaserScan(angle_min=-0.2, angle_increment=0.02, range_max=8.0, ranges=[0.24 + gap] * 21)
+        )
+        others.publish(other)
+        if held:
+            hand.publish(mine)
+        return told[-1].linear.x if told else None
+
+    graph.until(lambda: passes(3.0, held=False) == 0.5)
+    graph.until(lambda: passes(3.0, held=True) == 0.2)
+    graph.until(lambda: 0.0 <= passes(0.01, held=True) < 0.15)
+    graph.until(lambda: passes(3.0, held=True) == 0.2)
+    # Who lets go gives the robot back.
+    graph.until(lambda: passes(3.0, held=False) == 0.5)

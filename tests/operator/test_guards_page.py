@@ -46,7 +46,7 @@ class Desk:
                     'states': ['over'],
                     'severities': ['alert'],
                     'robots': [],
-                },  # fmt: skip
+                },
             },
             actions={
                 'alarm': self._alarm,

@@ -224,9 +224,9 @@ def as_html(shift: Shift, of: str) -> str:
         f'{counted(visits, "visit")}, {shift.metres:.0f} m; '
         f'<b>{len(shift.open_ones)} open at its end</b>.</p>',
         '<h2>Open</h2>',
-        _alarms(shift.open_ones, shift.end, 'nothing is open'),
+        _alarms(shift.open_ones, shift.end, 'nothing is open', 'Open'),
         '<h2>Alarms and warnings</h2>',
-        _alarms(shift.events, shift.end, 'none'),
+        _alarms(shift.events, shift.end, 'none', 'Alarms and warnings'),
         '<h2>Places</h2>',
         _places(shift),
         '<h2>What kept the robot</h2>',
@@ -234,6 +234,7 @@ def as_html(shift: Shift, of: str) -> str:
             ('At', 'Robot', 'What', 'Why'),
             [(_clock(at), robot, what, why) for at, robot, what, why in shift.failures],
             'nothing',
+            'What kept the robot',
         ),
     ]
     if shift.end - shift.begin > 1.5 * 86400:
@@ -244,6 +245,7 @@ def as_html(shift: Shift, of: str) -> str:
             ('At', 'Who', 'What', 'Answer'),
             [(_clock(at), f'{who} ({role})', *rest) for at, who, role, *rest in shift.presses],
             'nothing',
+            'What was pressed',
         ),
     ]
     return (
@@ -255,7 +257,7 @@ def as_html(shift: Shift, of: str) -> str:
     )
 
 
-def _alarms(events: Sequence[DeskEvent], end: float, none: str) -> str:
+def _alarms(events: Sequence[DeskEvent], end: float, none: str, label: str) -> str:
     rows = []
     for each in events:
         done = each.handling
@@ -278,7 +280,7 @@ def _alarms(events: Sequence[DeskEvent], end: float, none: str) -> str:
             )
         )
     head = ('Since', 'What', 'Where', 'Rule', 'State', 'Lasted', 'Acknowledged', 'Said')
-    return _table(head, rows, none)
+    return _table(head, rows, none, label)
 
 
 def _places(shift: Shift) -> str:
@@ -292,7 +294,8 @@ def _places(shift: Shift) -> str:
         )
         for (robot, place), each in sorted(shift.places.items(), key=lambda e: -e[1].longest)
     ]
-    return _table(('Place', 'Visits', 'Longest without', 'Last visit'), rows, 'none was visited')
+    head = ('Place', 'Visits', 'Longest without', 'Last visit')
+    return _table(head, rows, 'none was visited', 'Places')
 
 
 def _trends(shift: Shift) -> str:
@@ -328,10 +331,11 @@ def _trends(shift: Shift) -> str:
     ]
     head = ('Day', 'Alarms', 'False', 'Warnings', 'Acknowledged after', 'Failures')
     label = f'alarms of each day, at most {most}'
-    return f'<div class="bars" role="img" aria-label="{label}">{bars}</div>{_table(head, rows, "")}'
+    table = _table(head, rows, '', 'Day by day')
+    return f'<div class="bars" role="img" aria-label="{label}">{bars}</div>{table}'
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], none: str) -> str:
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]], none: str, label: str) -> str:
     if not rows:
         return f'<p>{none}</p>'
     cells = ''.join(f'<th scope="col">{escape(each)}</th>' for each in head)
@@ -346,7 +350,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]], none: str) -> str
     )
     more = f'<p>and {len(rows) - MOST_ROWS} more</p>' if len(rows) > MOST_ROWS else ''
     return (
-        f'<div class="t" tabindex="0" role="region" aria-label="{escape(head[1])}">'
+        f'<div class="t" tabindex="0" role="region" aria-label="{escape(label)}">'
         f'<table><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table></div>{more}'
     )
 
