@@ -42,7 +42,7 @@ from surveillance_operator.hand_driving import HandDriving
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
 from surveillance_operator.mission_actions import MissionActions
 from surveillance_operator.mission_state import MissionState, Notice
-from surveillance_operator.page.access import Links, Person
+from surveillance_operator.page.access import Links, PageUser
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Document, Page
 from surveillance_operator.place_page.edit_session import EditSession
@@ -361,7 +361,7 @@ class PressLog:
         self._lock = threading.Lock()
         self._log: EventLog | None = None
 
-    def write(self, person: Person, action: str, fields: Mapping[str, Any], said: str) -> None:
+    def write(self, person: PageUser, action: str, fields: Mapping[str, Any], said: str) -> None:
         """Write one press."""
         if self._folder is None:
             return

@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 
 from surveillance_operator.desk.event_index import EventIndex, LogFollower, read_run
-from surveillance_operator.desk.live_desk import LiveDesk
-from surveillance_operator.desk.questions import EventQuestions
 from surveillance_runtime.event_log import RECORD, Clocks, EventLog
 
 pytestmark = pytest.mark.unit
@@ -107,32 +105,6 @@ def test_the_past_is_told_as_it_was(tmp_path: Path) -> None:
     assert index.open_at(run.now) == []  # a run that is over has nothing open
 
 
-def test_a_search_finds_by_time_place_kind_severity_and_state(tmp_path: Path) -> None:
-    run, index = Run(tmp_path), EventIndex()
-    for number in range(1, 11):
-        run.now = NIGHT + 3600 * number
-        kind = 'door' if number % 2 else 'person'
-        run.finding(number, kind=kind, seen='seen', place=f'R{number % 3}', severity=number % 4)
-    read_run(index, tmp_path)
-    ask = EventQuestions(index, lambda: run.now).search
-    numbers = lambda found: [each['number'] for each in found['events']]  # noqa: E731
-    assert numbers(ask(kind='person')) == [10, 8, 6, 4, 2]
-    assert numbers(ask(severity='alert')) == [7, 3]
-    assert numbers(ask(place='R1', most='2')) == [10, 7]
-    assert numbers(ask(begin=str(NIGHT + 3600 * 9), kind='door', severity='notice'))[0] == 9
-    assert numbers(ask(text='PERSON r1')) == [10, 4]
-    assert numbers(ask(state='open', severity='warning')) == [10, 7, 6, 3, 2]
-    assert ask(skip='9')['count'] == 10
-    for wrong, expected in (
-        ({'severity': 'alrt'}, "expected 'alert'"),
-        ({'begin': 'yesterday'}, 'expected such as 2026-03-01T22:00'),
-        ({'most': '-1'}, 'expected a number'),
-        ({'state': 'acked'}, 'expected'),
-    ):
-        with pytest.raises(ValueError, match=expected):
-            ask(**wrong)
-
-
 def test_a_log_is_followed_while_it_is_packed_away(tmp_path: Path) -> None:
     run, index = Run(tmp_path), EventIndex()
     follower = LogFollower(tmp_path, lambda lines: index.read(lines, 'run', live=True))
@@ -163,31 +135,3 @@ def test_what_is_no_entry_costs_nothing_but_itself(tmp_path: Path) -> None:
     ]
     assert index.read(lines, 'run') == 1
     assert index.search(NIGHT)['events'][0]['text'] == 'observer: killed'
-
-
-def test_the_desk_tells_what_is_open_when_it_changes_and_finds_older_runs(tmp_path: Path) -> None:
-    old, new = tmp_path / '20260101-000000', tmp_path / '20260102-000000'
-    Run(old).incident('old', 'begin')
-    run, told = Run(new), list[Any]()
-    desk = LiveDesk(new, told.append, lambda: run.now)
-    desk.look()
-    run.incident('abc', 'begin')
-    desk.look()
-    desk.look()
-    assert [[each['id'] for each in part['open']] for part in told] == [[], ['abc']]
-    desk.read_older(lambda: False)
-    assert desk.questions()['search']()['count'] == 2
-    assert desk.part()['count'] == 1
-    with pytest.raises(ValueError, match='no event'):
-        desk.find('nothing')
-
-
-def test_a_shelf_that_ends_is_told(tmp_path: Path) -> None:
-    run, told = Run(tmp_path / 'run'), list[Any]()
-    desk = LiveDesk(tmp_path / 'run', told.append, lambda: run.now)
-    run.incident('abc', 'begin')
-    run.say('shelve', 'abc', until=NIGHT + 100)
-    desk.look()
-    run.now += 101
-    desk.look()
-    assert [part['open'][0]['state'] for part in told] == ['shelved', 'unacknowledged']

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_operator.desk.documents import DeskDocuments
 from surveillance_operator.desk.event_index import EventIndex, read_run
 from surveillance_operator.desk.hand_over import Shift, as_csv, as_html, shift_of
 from tests.operator.browser import CHROMIUM, DESK, DRIVER, MISSING, PHONE, Viewer
@@ -72,26 +71,6 @@ def test_the_csv_has_a_row_for_each_alarm_and_no_formula(night: EventIndex, tmp_
     assert (rows[0]['acknowledged_by'], rows[0]['minutes_to_acknowledge']) == ('Anna', '10.0')
     assert rows[1]['rule'] == "'=cmd"
     assert rows[1]['state'] == 'unacknowledged'
-
-
-def test_a_week_shows_how_it_went_day_by_day(night: EventIndex, tmp_path: Path) -> None:
-    documents = DeskDocuments(night, tmp_path, lambda: NIGHT + 3 * HOUR)
-    page = documents.report(begin=str(NIGHT - 6 * 24 * HOUR), of='week').content.decode()
-    assert page.count('<div style="height') in (7, 8)  # by the time zone
-    assert documents.report(form='csv').name.startswith('alarms_2026-03-0')
-    for wrong, expected in (
-        ({'of': 'weak'}, "expected 'week'"),
-        ({'form': 'pdf'}, 'expected'),
-        ({'begin': '2026-13-45'}, "time '2026-13-45': expected"),
-        ({'begin': '5', 'end': '4'}, 'after the begin'),
-    ):
-        with pytest.raises(ValueError, match=expected):
-            documents.report(**wrong)
-    with pytest.raises(ValueError, match='no event'):
-        documents.clip('nothing')
-    key = night.search(NIGHT)['events'][0]['key']
-    with pytest.raises(ValueError, match='nothing is recorded'):
-        documents.clip(key)
 
 
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason=MISSING)

@@ -182,18 +182,22 @@ def test_zones_and_stations_are_drawn_and_drawn_anew(
 def test_what_is_empty_says_so(broadcaster: Broadcaster, viewer: Viewer) -> None:
     show(broadcaster, viewer, 'nothing')
     assert viewer.text('#title') == 'no mission yet'
-    for each in (
-        '#map-section',
-        '#machine-section',
-        '#health-section',
-        '#control',
-        '#time-section',
+    for view, sections in (
+        ('engineer', ('#machine-section', '#health-section', '#time-section')),
+        ('desk', ('#map-section', '#control')),
     ):
-        assert visible(viewer, f'{each} [data-without]'), each
+        look(viewer, view)
+        for each in sections:
+            assert visible(viewer, f'{each} [data-without]'), each
     assert not visible(viewer, '[data-machine=pause]')
     show(broadcaster, viewer, 'hostile')
     assert visible(viewer, '#map')
     assert not visible(viewer, '#map-section [data-without]')
+
+
+def look(viewer: Viewer, view: str) -> None:
+    viewer.click(f'nav [href="#/{view}"]')
+    viewer.until(lambda: viewer.js('return document.body.dataset.view') == view)
 
 
 def test_each_link_of_the_head_leads_to_what_is_shown(
@@ -202,11 +206,15 @@ def test_each_link_of_the_head_leads_to_what_is_shown(
     show(broadcaster, viewer, 'begins')
     viewer.size(*PHONE, dark=False)
     links = viewer.js(
-        """return [...document.querySelectorAll("header nav a[href^='#']")]
+        """return [...document.querySelectorAll("header nav a[href^='#/']")]
         .filter((each) => each.checkVisibility()).map((each) => each.getAttribute('href'))"""
     )
-    assert '#map-section' in links
-    assert [each for each in links if not visible(viewer, each)] == []
+    assert links[:3] == ['#/desk', '#/events', '#/engineer']
+    for each in reversed(links):
+        look(viewer, each[2:])
+        assert visible(viewer, f'.view[data-view={each[2:]}]')
+        assert viewer.count('.view:not([hidden])') == 1
+        assert viewer.attribute('nav [aria-current]', 'href') == each
     viewer.size(*DESK, dark=False)
 
 
@@ -296,8 +304,8 @@ def test_no_link_leads_below_the_header(broadcaster: Broadcaster, viewer: Viewer
     broadcaster.show(STATES['large'].having(status=long))
     viewer.until(lambda: 'reasons' in viewer.text('#state'))
     viewer.size(*PHONE)
-    for section in ('why', 'camera-section', 'control', 'machine-section'):
-        viewer.click(f'nav [href="#{section}"]')
+    for section in ('map-section', 'alarms-section', 'control'):
+        viewer.js(f'location.hash = "#{section}"')
         bottom = viewer.js('return document.querySelector("header").getBoundingClientRect().bottom')
         top = viewer.js(f'return document.getElementById("{section}").getBoundingClientRect().top')
         assert bottom <= top < 300

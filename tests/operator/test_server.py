@@ -213,10 +213,10 @@ def test_an_address_that_is_taken_is_one_line(page: Page) -> None:
 
 
 def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> None:
-    asked: list[tuple[str, str, bool]] = []
+    asked: list[tuple[str, str, str, bool]] = []
 
-    def picture(name: str, robot: str, leaves: bool) -> bytes | None:
-        asked.append((name, robot, leaves))
+    def picture(name: str, robot: str, run: str, leaves: bool) -> bytes | None:
+        asked.append((name, robot, run, leaves))
         return b'jpeg' if name == 'a.jpg' else None
 
     here = Page(Broadcaster(), questions={}, actions={}, evidence=picture, port=0)
@@ -225,10 +225,14 @@ def test_pictures_are_for_whoever_may_look_and_beyond_this_machine_blurred() -> 
         each.start()
     try:
         assert ask(here, 'GET', '/evidence/a.jpg') == (200, 'jpeg')
-        assert ask(here, 'GET', '/evidence/b.jpg?robot=anna')[0] == 404
+        assert ask(here, 'GET', '/evidence/b.jpg?robot=anna&run=old')[0] == 404
         assert ask(away, 'GET', '/evidence/a.jpg')[0] == 403
         assert ask(away, 'GET', f'/evidence/a.jpg?token={away.token}') == (200, 'jpeg')
     finally:
         for each in (here, away):
             each.stop()
-    assert asked == [('a.jpg', '', False), ('b.jpg', 'anna', False), ('a.jpg', '', True)]
+    assert asked == [
+        ('a.jpg', '', '', False),
+        ('b.jpg', 'anna', 'old', False),
+        ('a.jpg', '', '', True),
+    ]

@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from indoor_watch.observations import Kind
+from indoor_watch import Kind
 from surveillance_operator.desk.handling import AlarmState, Handled, Handling, Mutes
 from surveillance_runtime.event_log import record_in, segments
 

@@ -36,7 +36,7 @@ _WORDS_OF_GUARDS = ('stop', 'release')
 
 
 @dataclass(frozen=True)
-class Person:
+class PageUser:
     """Who has sent a request.
 
     Attributes:
@@ -52,9 +52,9 @@ class Person:
         return ROLES.index(self.role) >= ROLES.index(role)
 
 
-NOBODY = Person('somebody', VIEWER)
+NOBODY = PageUser('somebody', VIEWER)
 """Who has no token, on this machine."""
-HOLDER = Person('operator', OPERATOR)
+HOLDER = PageUser('operator', OPERATOR)
 """Who has the token that the mission prints."""
 
 
@@ -93,12 +93,12 @@ class Links:
         self._links: tuple[Link, ...] = ()
         self._read_at: tuple[int, int] | None = None
 
-    def person(self, token: str) -> Person | None:
+    def person(self, token: str) -> PageUser | None:
         """Return whose token it is; None: nobody's."""
         given = _hash(token)
         for each in self._now():
             if secrets.compare_digest(each.hash, given):
-                return Person(each.name, each.role)
+                return PageUser(each.name, each.role)
         return None
 
     def listed(self) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 
-from surveillance_operator.page.access import HOLDER, Links, Person
+from surveillance_operator.page.access import HOLDER, Links, PageUser
 from surveillance_runtime import parameter_checks
 
 COOKIE_SECONDS = 30 * 86400
@@ -62,7 +62,7 @@ class Gate:
             return 403, 'a token is needed: open the address that the mission printed'
         return None
 
-    def person(self, request: Request) -> Person | None:
+    def person(self, request: Request) -> PageUser | None:
         """Return who has sent a request; None: somebody without a valid token."""
         given = request.query_params.get('token') or request.cookies.get(self._cookie, '')
         # A program, as one that reads the metrics, has no cookies.

@@ -53,7 +53,7 @@ from surveillance_operator.page.access import (
     NOBODY,
     OPERATOR,
     Links,
-    Person,
+    PageUser,
     least_role,
 )
 from surveillance_operator.page.api import description
@@ -91,7 +91,7 @@ STOPPING = ('stop', 'fleet')
 Action = Callable[..., Any]
 """Takes a request's fields by name; returns what came of it, or raises `ValueError` or `CallError`
 with one line. One that takes `by` is told who sends it."""
-Pressed = Callable[[Person, str, Mapping[str, Any], str], object]
+Pressed = Callable[[PageUser, str, Mapping[str, Any], str], object]
 """Told of an action: who, its name, its fields, what came of it."""
 
 
@@ -269,6 +269,11 @@ class Page:
             'imports': int(may_edit and 'import_map' in self._actions),
             'live': int(self._front != name),
             'past': int('past' in self._questions),
+            'search': int('search' in self._questions),
+            'mutes': int('mute' in self._actions),
+            'sinks': int('sinks' in self._actions),
+            'rules': int('rule' in self._actions),
+            'people': int('links' in self._actions and is_operator),
             'reports': int('report' in self._documents),
         }
         attributes = ' '.join(f'data-{name}="{value}"' for name, value in shown.items())

@@ -245,6 +245,8 @@ document.body.classList.toggle('replay', replaying);
 $('replay').hidden = !replaying;
 for (const each of document.querySelectorAll('.control')) each.hidden = !may || replaying;
 for (const each of document.querySelectorAll('.guard')) each.hidden = !guard || replaying;
+$('people-link').hidden = root.dataset.people !== '1';
+$('rule').hidden = !may || root.dataset.rules !== '1';
 present();
 connect();
 setInterval(() => { listen(); alarms.tick(); if (!past) map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
@@ -252,6 +254,6 @@ setInterval(camera, 700);
 if (root.dataset.past === '1') new Shift({wall, past: lookBack, choose: (event) => { open('events'); search.show(event); }});
 if (may && !replaying) {
   new Drive(map);
-  startPeople();
+  if (root.dataset.people === '1') startPeople();
 }
 startViews();

@@ -46,6 +46,7 @@ export class Search {
   }
 
   async begin() {
+    if (document.documentElement.dataset.search !== '1') { $('search-said').textContent = 'nothing is kept of this run'; return; }
     const found = await ask('choices', {});
     if (!found.ok) { $('search-said').textContent = found.text; return; }
     const fill = (name, values, all) => {
@@ -63,6 +64,7 @@ export class Search {
   }
 
   async look(skip = 0) {
+    if (document.documentElement.dataset.search !== '1') return;
     const given = Object.fromEntries(new FormData(this.form));
     const asked = {...given, begin: seconds(given.begin), end: seconds(given.end), skip, most: PAGE};
     const number = this.asked = (this.asked ?? 0) + 1;
@@ -120,10 +122,10 @@ export class Search {
 
   quiet() {
     const tell = (found) => { $('quiet-said').textContent = (found.ok ? '✓ ' : '✗ ') + found.text; };
-    $('quiet-section').hidden = document.documentElement.dataset.kind === 'replay';
+    $('quiet-section').hidden = document.documentElement.dataset.mutes !== '1';
     $('mute').addEventListener('submit', async (event) => { event.preventDefault(); tell(await act('mute', Object.fromEntries(new FormData($('mute'))))); });
     $('rule').addEventListener('submit', async (event) => { event.preventDefault(); tell(await act('rule', Object.fromEntries(new FormData($('rule'))))); });
-    if (!this.operator) return;
+    if (!this.operator || document.documentElement.dataset.sinks !== '1') return;
     whenShown('events', async () => {
       const found = await act('sinks', {});
       const names = found.ok && !found.text.startsWith('none') ? found.text.split(', ') : [];
