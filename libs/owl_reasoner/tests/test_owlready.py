@@ -222,6 +222,35 @@ def test_it_ends_at_its_time_and_when_it_is_cancelled(shop: Shop) -> None:
     assert shop.aspirin.is_a == [shop.onto.Cheap]
 
 
+def test_a_property_that_relates_nothing_is_the_empty_one_until_it_may_relate_something(
+    shop: Shop,
+) -> None:
+    onto, world = shop.onto, shop.world
+    with onto:
+
+        class Shut(Thing):
+            is_a = [Not(onto.Drug)]
+
+        class opens(Shut >> Thing):
+            range = [onto.Drug]
+
+        class label(Shut >> str):
+            pass
+
+        class wrong(Thing >> int):
+            range = [str]
+
+        Shut.is_a.append(opens.only(Shut))
+
+    sync_reasoner_native(world)
+    assert opens.equivalent_to == [owlready2.bottomObjectProperty]
+    assert wrong.equivalent_to == [world['http://www.w3.org/2002/07/owl#bottomDataProperty']]
+    assert (label.equivalent_to, onto.beside.equivalent_to) == ([], [])
+    Shut.is_a.remove(Not(onto.Drug))
+    sync_reasoner_native(world)
+    assert (opens.equivalent_to, opens.is_a) == ([], [owlready2.ObjectProperty])
+
+
 def test_what_is_not_used_is_told(shop: Shop) -> None:
     with shop.onto:
         rule = Imp()

@@ -2,7 +2,8 @@
 
 It has the effects of owlready2's `sync_reasoner_pellet`: classes and individuals get the most
 specific classes that follow as parents, individuals the values that follow, impossible classes
-become equivalent to ``Nothing``, and a contradiction is an `OwlReadyInconsistentOntologyError`.
+become equivalent to ``Nothing``, properties that relate nothing to the empty property, and a
+contradiction is an `OwlReadyInconsistentOntologyError`.
 
 A World keeps its reasoner between calls. Triggers of SQLite write down which quads changed since,
 so that a call costs what changed, not what is there. What follows no more is taken back, in the
@@ -15,7 +16,7 @@ import math
 import threading
 import warnings
 import weakref
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,7 +29,8 @@ from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.notifier import Changes
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl.axioms import Axiom
-from owl_reasoner.owl.vocabulary import NOTHING, OWL, RDF, RDFS, THING
+from owl_reasoner.owl.expressions import DataSomeValuesFrom, ObjectSomeValuesFrom
+from owl_reasoner.owl.vocabulary import NOTHING, OWL, RDF, RDFS, THING, TOP_LITERAL
 from owl_reasoner.owlready.quads import Quad, StoredNames, contexts_of, read_axioms, stored_value
 
 INFERRED = 'http://inferrences/'
@@ -37,6 +39,15 @@ RESERVED = 300
 """The largest number that owlready2 keeps for the words of OWL."""
 _LOG = 'owl_reasoner_log'
 _TYPE, _SUBCLASS, _EQUIVALENT = RDF + 'type', RDFS + 'subClassOf', OWL + 'equivalentClass'
+_SAME_PROPERTY = OWL + 'equivalentProperty'
+_EMPTY = {
+    'object_property': OWL + 'bottomObjectProperty',
+    'data_property': OWL + 'bottomDataProperty',
+}
+"""The empty property of each kind."""
+_SCHEMA = (_SUBCLASS, _EQUIVALENT, _SAME_PROPERTY)
+_PROBE = 'urn:owl_reasoner:has:'
+"""Before the name of a property: the class of what has a value of it, impossible if nothing can."""
 _PYTHON_NAME = 'http://www.lesfleursdunormal.fr/static/_downloads/owlready_ontology.owl#python_name'
 _UNREASONED = {_PYTHON_NAME, *(RDFS + name for name in ('label', 'comment', 'seeAlso'))}
 _ANY_KIND = ('class', 'object_property', 'data_property', 'annotation_property', 'datatype')
@@ -200,15 +211,26 @@ class _Session:
         self._names = {}
         mapping = read_axioms(self.world, self._contexts(), hidden, self._names)
         self._kinds = _Kinds.of(mapping.declared)
+        found = dict.fromkeys((*mapping.axioms, *self._probes()))
         if self._kb is None:
-            self._kb = KnowledgeBase('', mapping.axioms)
+            self._kb = KnowledgeBase('', found)
             self._kb.subscribe(self._note)
             self._touched.update(self._all_named())
         else:
             known = dict.fromkeys(self._kb.axioms())
-            come = [axiom for axiom in mapping.axioms if axiom not in known]
-            self._kb.change(come, [axiom for axiom in known if axiom not in mapping.axioms])
+            come = [axiom for axiom in found if axiom not in known]
+            self._kb.change(come, [axiom for axiom in known if axiom not in found])
         return mapping.unsupported
+
+    def _probes(self) -> Iterator[Axiom]:
+        """Yield for each property a class whose members would have a value of it."""
+        for name, kind in self._kinds.single.items():
+            if name.startswith(OWL):
+                continue
+            if kind == 'object_property':
+                yield ax.SubClassOf(_PROBE + name, ObjectSomeValuesFrom(name, THING))
+            elif kind == 'data_property':
+                yield ax.SubClassOf(_PROBE + name, DataSomeValuesFrom(name, TOP_LITERAL))
 
     def _simple(self, rows: list[tuple[Any, ...]]) -> tuple[list[Axiom], list[Axiom]] | None:
         """Return what came and what went, where all of it is of individuals; else None."""
@@ -292,33 +314,43 @@ class _Session:
             entities += [
                 (name, True)
                 for name, kind in self._kinds.single.items()
-                if kind == 'class' and name[:2] != '_:' and name not in (THING, NOTHING)
+                if (kind == 'class' or kind in _EMPTY)
+                and name[:2] != '_:'
+                and name not in (THING, NOTHING)
             ]
         come: list[Quad] = []
         gone: list[Quad] = []
         parents: dict[int, list[int]] = {}
         types: dict[int, str] = {}
-        for name, is_class in entities:
+        for name, is_schema in entities:
             storid = number(name)
-            above = self._superclasses(name) if is_class else _most_specific(kb, kb.types(name))
+            empty = _EMPTY.get(self._kinds.single[name]) if is_schema else None
+            above: set[str] = set()
+            if empty is not None:
+                found = self._of_property(name, empty)
+            elif is_schema:
+                above = self._superclasses(name)
+                found = self._of_class(name, above)
+            else:
+                above = _most_specific(kb, kb.types(name))
+                found = self._of_individual(name, above)
             if above:
                 parents[storid] = [number(cls) for cls in sorted(above)]
-                types[storid] = 'class' if is_class else 'individual'
-            found = self._of_class(name, above) if is_class else self._of_individual(name, above)
-            before, after = self._own(storid, is_class), dict.fromkeys(found)
+                types[storid] = 'class' if is_schema else 'individual'
+            before, after = self._own(storid, is_schema), dict.fromkeys(found)
             gone += [quad for quad in before if quad not in after]
             come += [quad for quad in after if quad not in before]
         self._apply(come, gone, parents, types, debug)
 
-    def _own(self, storid: int, is_class: bool) -> list[Quad]:
-        """Return what was written of an entity."""
+    def _own(self, storid: int, is_schema: bool) -> list[Quad]:
+        """Return what was written of an entity: as a class or property, or as an individual."""
         execute, c = self.graph.execute, self.target.graph.c
         found: list[Quad] = execute(
             'SELECT s, p, o FROM objs WHERE s=? AND c=?', (storid, c)
         ).fetchall()
         found += execute('SELECT s, p, o, d FROM datas WHERE s=? AND c=?', (storid, c)).fetchall()
-        schema = {self.world._abbreviate(name) for name in (_SUBCLASS, _EQUIVALENT)}
-        return [quad for quad in found if quad in self._written and (quad[1] in schema) == is_class]
+        schema = {self.world._abbreviate(name) for name in _SCHEMA}
+        return [quad for quad in found if quad in self._written and (quad[1] in schema) == is_schema]
 
     def _of_individual(self, name: str, types: Iterable[str]) -> Iterator[Quad]:
         """Yield what follows of an individual and is not asserted."""
@@ -372,6 +404,13 @@ class _Session:
         for sup in supers:
             yield from self._new((cls, above, number(sup)))
 
+    def _of_property(self, name: str, empty: str) -> Iterator[Quad]:
+        """Yield that a property relates nothing, where that follows and is not asserted."""
+        kb, number = self._kb, self.world._abbreviate
+        assert kb is not None
+        if kb.holds(ax.SubClassOf(_PROBE + name, NOTHING)):
+            yield from self._new((number(name), number(_SAME_PROPERTY), number(empty)))
+
     def _new(self, quad: Quad) -> Iterator[Quad]:
         if not self._is_asserted(quad):
             yield quad
@@ -398,14 +437,16 @@ class _Session:
     ) -> None:
         """Write quads, and bring the Python objects that are loaded up to date."""
         world, target, number = self.world, self.target, self.world._abbreviate
-        kind, above, same = number(_TYPE), number(_SUBCLASS), number(_EQUIVALENT)
+        kind, above = number(_TYPE), number(_SUBCLASS)
+        same = {number(_EQUIVALENT): 'class', number(_SAME_PROPERTY): 'property'}
+        schema = {kind, above, *same}
         for quad in gone:
             self._written.pop(quad, None)
             if len(quad) == 3:
                 target._del_obj_triple_spo(*quad)
             else:
                 target._del_data_triple_spod(*quad)
-        _take_back(world, [quad for quad in gone if quad[1] in (kind, above, same)], same)
+        _take_back(world, [quad for quad in gone if quad[1] in schema], same)
         self._written.update(dict.fromkeys(come))
         equals: dict[int, list[int]] = {}
         relations: list[tuple[Any, ...]] = []
@@ -413,9 +454,9 @@ class _Session:
         properties: dict[int, Any] = {}
         for quad in come:
             subject, predicate, value = quad[:3]
-            if predicate in (kind, above, same):
-                if predicate == same:
-                    types[subject] = 'class'
+            if predicate in schema:
+                if predicate in same:
+                    types[subject] = same[predicate]
                     equals.setdefault(subject, []).append(value)
                 continue
             if predicate not in properties:
@@ -426,7 +467,7 @@ class _Session:
             else:
                 values.append((subject, prop, value, quad[3]))
         for quad in gone:
-            if quad[1] not in (kind, above, same):
+            if quad[1] not in schema:
                 _forget_values(world, quad)
         apply = owlready2_reasoning
         apply._apply_reasoning_results(world, target, debug, parents, equals, types)
@@ -468,7 +509,7 @@ def _most_specific(kb: KnowledgeBase, classes: set[str]) -> set[str]:
     }
 
 
-def _take_back(world: Any, quads: list[Quad], same: int) -> None:
+def _take_back(world: Any, quads: list[Quad], same: Container[int]) -> None:
     """Give loaded entities the parents that the quad store has without what went."""
     for storid in {quad[0] for quad in quads}:
         entity = world._entities.get(storid)
@@ -476,10 +517,12 @@ def _take_back(world: Any, quads: list[Quad], same: int) -> None:
             continue
         with LOADING:
             for subject, predicate, value in quads:
-                if (subject, predicate) == (storid, same):
+                if subject == storid and predicate in same:
                     other = world._get_by_storid(value)
                     if other in entity.equivalent_to:
                         entity.equivalent_to._remove(other)
+            if isinstance(entity, owlready2.PropertyClass):
+                continue
             is_class = isinstance(entity, owlready2.EntityClass)
             relation = world._abbreviate(_SUBCLASS if is_class else _TYPE)
             kept = [one for one in entity.is_a if isinstance(one, owlready2.Construct)]
