@@ -7,7 +7,7 @@ FOLDER is `test` of owlready2's source package, in the version that is installed
 
 - plain: as they are;
 - native: `sync_reasoner_native` in place of HermiT and Pellet;
-- file: each World, also one that would be in memory, is a file that the service made and let go of;
+- file: each World with a file begins as one that the service made and let go of;
 - served: the same while the service has each of these files open.
 """
 
@@ -87,21 +87,18 @@ def use_files(new_file: Callable[[], Path], served: bool) -> None:
 
     @wraps(make)
     def on_file(graph: Any, filename: str, clone: Any = None, **options: Any) -> None:
-        is_new = filename == ':memory:' or not (
-            os.path.exists(filename) and os.path.getsize(filename)
-        )
-        if is_new and clone is None and not options.get('connection'):
-            if filename == ':memory:' or served:
+        is_new = not (os.path.exists(filename) and os.path.getsize(filename))
+        if filename != ':memory:' and not options.get('connection'):
+            if is_new and clone is None and served:
                 path = new_file()
-                if filename != ':memory:':
-                    # The tests open it again by their own name.
-                    Path(filename).unlink(missing_ok=True)
-                    Path(filename).symlink_to(path)
+                # The tests open it again by their own name.
+                Path(filename).unlink(missing_ok=True)
+                Path(filename).symlink_to(path)
                 filename = str(path)
-            else:
+            elif is_new and clone is None:
                 shutil.copyfile(new_file(), filename)
-        if served:
-            options['exclusive'] = False
+            if served:
+                options['exclusive'] = False
         make(graph, filename, clone, **options)
 
     triplelite.Graph.__init__ = on_file
@@ -110,6 +107,7 @@ def use_files(new_file: Callable[[], Path], served: bool) -> None:
 def use_native() -> None:
     """Put the native reasoner in place of those in Java."""
     import owlready2
+
     from owl_reasoner import sync_reasoner_native
 
     def reason(
@@ -158,7 +156,9 @@ def run(tests: Path, mode: str, words: str, folder: Path) -> None:
         for test in _all(unittest.defaultTestLoader.loadTestsFromModule(module)):
             name = test.id().partition('.')[2]
             source = inspect.getsource(getattr(test, test.id().rpartition('.')[2]))
-            if words not in name or (mode == 'native' and 'sync_reasoner' not in source):
+            if not any(word in name for word in words.split(',')) or (
+                mode == 'native' and 'sync_reasoner' not in source
+            ):
                 continue
             result = unittest.TestResult()
             test.run(result)
@@ -183,7 +183,12 @@ def main() -> None:
     parser = sized_parser(__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--tests', type=Path, help="the folder 'test' of owlready2's source")
     parser.add_argument('--modes', default=','.join(MODES), help='which of them, with commas')
-    parser.add_argument('-k', dest='words', default='', help='only tests with this in their name')
+    parser.add_argument(
+        '-k',
+        dest='words',
+        default='',
+        help='only tests with one of these, with commas, in their name',
+    )
     parser.add_argument('--show', action='store_true', help='print the whole of each failure')
     parser.add_argument('--one', nargs=2, help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -13,10 +13,12 @@ from owl_reasoner.gc_control import uncollected
 from owl_reasoner.notifier import Notifier
 from owl_reasoner.owl.assertions import Assertions, Unsettled, is_assertion
 from owl_reasoner.owl.axioms import (
+    Annotation,
     Axiom,
     ClassAssertion,
     Declaration,
     DifferentIndividuals,
+    Import,
     SubClassOf,
 )
 from owl_reasoner.owl.entities import entities_of
@@ -306,5 +308,6 @@ class Derivation:
         if self.completion is None or not self.completion.seconds:
             self.costly = None
         elif not took_cases and self.completion.seconds:
-            said = [one for one in changes.schema_added if not isinstance(one, Declaration)]
+            silent = Declaration | Import | Annotation
+            said = [one for one in changes.schema_added if not isinstance(one, silent)]
             self.costly = said[0] if len(said) == 1 else None

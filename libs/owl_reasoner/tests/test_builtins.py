@@ -19,6 +19,7 @@ from owl_reasoner.owl.expressions import (
 from owl_reasoner.owl.vocabulary import XSD
 from owl_reasoner.reasoner import swrl_builtins
 from owl_reasoner.reasoner.datatypes import value_of
+from owl_reasoner.reasoner.datetimes import DIGITS
 
 SWRLB = 'http://www.w3.org/2003/11/swrlb#'
 NAMES = (*swrl_builtins._TESTS, *swrl_builtins._COMPUTATIONS)
@@ -126,7 +127,7 @@ def test_a_built_in_has_as_many_arguments_as_the_submission_says(
 
 def test_a_quotient_that_no_decimal_is_equal_to_is_rounded_to_one() -> None:
     (quotient,) = solved('divide', Literal('1', XSD + 'integer'), Literal('3', XSD + 'integer'))
-    assert quotient == '0.' + '3' * swrl_builtins.DIGITS
+    assert quotient == '0.' + '3' * DIGITS
     kb = KnowledgeBase(
         'urn:x', [DataPropertyAssertion('urn:p', 'urn:i', Literal(quotient, XSD + 'decimal'))]
     )

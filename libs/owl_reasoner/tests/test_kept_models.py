@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+import random
+
 import pytest
 
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom, SubClassOf
+from owl_reasoner.owl.expressions import Literal
+from owl_reasoner.owl.vocabulary import XSD
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
 from owl_reasoner.reasoner.datatypes import value_of
 from owl_reasoner.reasoner.hypertableau.incremental import is_plain
@@ -37,13 +42,80 @@ def test_what_an_axiom_that_takes_cases_does_not_ask_for_changes_without_a_new_s
         kb.copy().reason(steps=800)
 
 
-def kb_now(kb: KnowledgeBase) -> list[Axiom]:
-    """Return what says what time it is."""
+def values_of(kb: KnowledgeBase, prop: str, name: str) -> list[Axiom]:
+    """Return what gives an individual values of a property."""
     return [
         axiom
-        for axiom in kb.axioms_about(n('Robot1'))
-        if isinstance(axiom, ax.DataPropertyAssertion) and axiom.prop == n('now')
+        for axiom in kb.axioms_about(n(name))
+        if isinstance(axiom, ax.DataPropertyAssertion) and axiom.prop == n(prop)
     ]
+
+
+def kb_now(kb: KnowledgeBase) -> list[Axiom]:
+    """Return what says what time it is."""
+    return values_of(kb, 'now', 'Robot1')
+
+
+def test_visits_of_one_place_after_the_other_take_no_new_search() -> None:
+    kb = seven_rooms(DEAD_END)
+    places = ('R1', 'R2', 'C1', 'R3', 'C2', 'R4')
+    for turn, place in enumerate(places * 2):
+        gone = [*kb_now(kb), *values_of(kb, 'visitedAt', place)]
+        later = NOW + turn + 1
+        kb.change([value('now', 'Robot1', later), value('visitedAt', place, later)], gone)
+        kb.reason(steps=1500 if turn > 5 else math.inf)
+        if turn in (3, 6, 11):
+            assert facts_of(kb) == facts_of(fresh_of(kb))
+    # A place must have a time of visit: one that is not told anew has an unknown one.
+    kb.change((), values_of(kb, 'visitedAt', 'R1'))
+    kb.reason()
+    assert facts_of(kb) == facts_of(fresh_of(kb))
+    kb.change([value('visitedAt', 'R1', NOW), value('visitedAt', 'R1', NOW + 1)])
+    assert not kb.reason()
+
+
+def fresh_of(kb: KnowledgeBase) -> KnowledgeBase:
+    """Return another one with the same assertions, reasoned over from nothing."""
+    fresh = kb.copy()
+    fresh.reason()
+    return fresh
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_values_that_come_and_go_leave_what_a_fresh_start_finds(seed: int) -> None:
+    draw = random.Random(seed)
+    at, size = 'x:at', 'x:size'
+    axioms: list[Axiom] = [
+        ax.FunctionalDataProperty(at),
+        SubClassOf(A, ex.ObjectUnionOf((B, C))),
+        SubClassOf(B, ex.DataMinCardinality(draw.randint(1, 2), size, XSD + 'integer')),
+        SubClassOf(A, ex.DataSomeValuesFrom(at, XSD + 'integer')),
+        SubClassOf(ex.DataSomeValuesFrom(at, ex.DataOneOf((Literal('1', XSD + 'integer'),))), D),
+        SubClassOf(ex.DataHasValue(size, Literal('2', XSD + 'integer')), C),
+        SubClassOf(ex.ObjectIntersectionOf((B, D)), ex.DataAllValuesFrom(size, XSD + 'integer')),
+        ax.DisjointClasses((C, D))
+        if draw.random() < 0.5
+        else SubClassOf(ex.DataSomeValuesFrom(at, XSD + 'integer'), A),
+        *(is_a(A, one) for one in (i, j, k)),
+        rel(P, i, j),
+        SubClassOf(ex.ObjectSomeValuesFrom(P, D), C),
+    ]
+    told = [
+        ax.DataPropertyAssertion(prop, one, Literal(str(number), XSD + 'integer'))
+        for prop in (at, size)
+        for one in (i, j, k)
+        for number in (1, 2, 3)
+    ]
+    kb = KnowledgeBase('x:', [*axioms, *draw.sample(told, 4)])
+    kb.reason()
+    for _ in range(25):
+        present = [axiom for axiom in told if axiom in kb]
+        come = draw.sample(told, draw.randint(0, 1))
+        kb.change(come, draw.sample(present, min(len(present), draw.randint(0, 2))))
+        consistent = kb.reason()
+        fresh = kb.copy()
+        assert fresh.reason() == consistent
+        assert facts_of(kb) == facts_of(fresh)
 
 
 def test_a_change_against_a_choice_that_was_kept() -> None:

@@ -12,6 +12,7 @@ import pytest
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import (
     Axiom,
+    DataPropertyAssertion,
     EquivalentClasses,
     FunctionalObjectProperty,
     HasKey,
@@ -436,3 +437,35 @@ def test_a_comparison_with_no_number_admits_no_set_of_values() -> None:
         compared(ComputedAtom('lessThan', operator.lt, None, (0, Constant(10**400, True))), 0)
         is None
     )
+
+
+def test_a_place_that_nobody_visited_since_yesterday() -> None:
+    swrlb = 'http://www.w3.org/2003/11/swrlb#'
+    r, now, p, seen, gap = map(Variable, ('r', 'now', 'p', 'seen', 'gap'))
+    day = Literal('P1D', XSD + 'dayTimeDuration')
+    rule = Rule(
+        (
+            DataPropertyAtom('x:now', r, now),
+            DataPropertyAtom('x:seen', p, seen),
+            BuiltinAtom(swrlb + 'subtractDateTimesYieldingDayTimeDuration', (gap, now, seen)),
+            BuiltinAtom(swrlb + 'greaterThan', (gap, day)),
+        ),
+        (ClassAtom('x:Stale', p),),
+    )
+
+    def at(prop: str, name: str, text: str) -> DataPropertyAssertion:
+        return DataPropertyAssertion(prop, name, Literal(text, XSD + 'dateTime'))
+
+    kb = KnowledgeBase(
+        'x:',
+        [
+            rule,
+            at('x:now', 'x:robot', '2026-11-29T08:00:00+01:00'),
+            at('x:seen', 'x:hall', '2026-11-28T06:59:59Z'),
+            at('x:seen', 'x:lab', '2026-11-28T07:00:00Z'),
+            at('x:seen', 'x:attic', '2026-11-20T07:00:00'),
+        ],
+    )
+    assert kb.reason()
+    assert kb.instances('x:Stale') == {'x:hall'}, 'the attic was visited in a zone that is not told'
+    assert kb.unsupported == ()

@@ -350,7 +350,8 @@ class _Session:
         ).fetchall()
         found += execute('SELECT s, p, o, d FROM datas WHERE s=? AND c=?', (storid, c)).fetchall()
         schema = {self.world._abbreviate(name) for name in _SCHEMA}
-        return [quad for quad in found if quad in self._written and (quad[1] in schema) == is_schema]
+        written = (quad for quad in found if quad in self._written)
+        return [quad for quad in written if (quad[1] in schema) == is_schema]
 
     def _of_individual(self, name: str, types: Iterable[str]) -> Iterator[Quad]:
         """Yield what follows of an individual and is not asserted."""

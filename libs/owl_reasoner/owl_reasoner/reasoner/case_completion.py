@@ -28,6 +28,9 @@ _MOST_UNSERVING = 2
 _LEAST_STEPS = 10_000
 """Steps that a model which is kept may take in any case."""
 
+_GIVEN_UP = 'reasoning by cases took too many steps'
+"""Why an axiom is not fully used where a search was given up."""
+
 
 class CaseCompletion:
     """What reasoning by cases adds to one classification and its engine.
@@ -204,12 +207,15 @@ class CaseCompletion:
 
     def _report(self, gaps: Iterable[str], stopped: bool) -> None:
         """Name what is still left out, in the words of the classification where it has some."""
-        found = list(self._native) if stopped else []
+        found: list[str] = []
         for gap in gaps:
             subject = gap.rpartition(': ')[0] + ':'
             said = [sentence for sentence in self._native if sentence.startswith(subject)]
             found += said or [gap]
         if stopped:
-            found.append('the ontology: reasoning by cases took too many steps')
+            # Cases would have covered what the clauses do not.
+            left = [sentence for sentence in self._native if sentence not in found]
+            found += [f'{sentence.rpartition(": ")[0]}: {_GIVEN_UP}' for sentence in left]
+            found.append(f'the ontology: {_GIVEN_UP}')
         found += self._program.unsupported[len(self._native) :]
         self._left_out = tuple(dict.fromkeys(found))

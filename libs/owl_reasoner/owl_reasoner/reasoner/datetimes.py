@@ -24,7 +24,9 @@ _FORM = re.compile(
     r'(-?(?:[1-9]\d{3,}|0\d{3}))-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(\.\d+)?(Z|[+-]\d\d:\d\d)?',
     re.ASCII,
 )
-_DAY = 86_400
+DAY = 86_400
+DIGITS = 30
+"""Digits behind the point of a quotient; XPath asks for 18 in all at least."""
 _CYCLE_YEARS, _CYCLE_DAYS = 400, 146_097
 """The calendar repeats itself; Python's dates know the years 1 to 9999 only."""
 LARGEST_OFFSET = 14 * 3600
@@ -68,7 +70,7 @@ def moment_of(text: str) -> Moment:
     if (hour > 23 and not is_end_of_day) or minute > 59 or second > 59:
         raise ValueError(f'{text!r} has no such time')
     days = _days(int(found[1]), int(found[2]), int(found[3]))
-    seconds = days * _DAY + hour * 3600 + minute * 60 + second + fraction
+    seconds = days * DAY + hour * 3600 + minute * 60 + second + fraction
     zone = found[8]
     if zone is None:
         return ('dateTime', 'local', seconds)
@@ -90,14 +92,11 @@ def _days(year: int, month: int, day: int) -> int:
 def text_of(moment: Moment) -> str:
     """Return the lexical form of a value."""
     seconds = moment[2] + (moment[3] if moment[1] == 'utc' else 0)
-    days, rest = divmod(seconds, _DAY)
-    cycles, day = divmod(int(days), _CYCLE_DAYS)
-    date = datetime.date.fromordinal(day + 1)
-    year = date.year + cycles * _CYCLE_YEARS
-    whole = math.floor(rest)
-    text = f'{"-" if year < 0 else ""}{abs(year):04}-{date.month:02}-{date.day:02}'
-    text += f'T{whole // 3600:02}:{whole // 60 % 60:02}:{whole % 60:02}'
-    text += _digits_behind(rest)
+    year, month, day, rest = on_calendar(seconds)
+    full = math.floor(rest)
+    text = f'{"-" if year < 0 else ""}{abs(year):04}-{month:02}-{day:02}'
+    text += f'T{full // 3600:02}:{full // 60 % 60:02}:{full % 60:02}'
+    text += digits_behind(rest)
     if moment[1] == 'utc':
         minutes = abs(moment[3]) // 60
         sign = '-' if moment[3] < 0 else '+'
@@ -160,7 +159,7 @@ def duration_of(datatype: str, text: str) -> Duration:
     years, months, days, hours, minutes = (int(found[part] or 0) for part in range(2, 7))
     seconds = Fraction(found[7] or 0) + 60 * (minutes + 60 * (hours + 24 * days))
     sign = -1 if found[1] else 1
-    value = ('duration', sign * (12 * years + months), sign * _whole(seconds))
+    value = ('duration', sign * (12 * years + months), sign * whole(seconds))
     has = 'T' in text or 'D' in text, found[2] or found[3]
     if (datatype == 'dayTimeDuration' and has[1]) or (datatype == 'yearMonthDuration' and has[0]):
         raise ValueError(f'{text!r} is no {datatype}')
@@ -185,7 +184,7 @@ def duration_text(value: Duration) -> str:
     date = ''.join(f'{n}{unit}' for n, unit in ((years, 'Y'), (months, 'M'), (days, 'D')) if n)
     time = ''.join(f'{n}{unit}' for n, unit in ((hours, 'H'), (minutes, 'M')) if n)
     if rest:
-        time += f'{math.floor(rest)}{_digits_behind(rest)}S'
+        time += f'{math.floor(rest)}{digits_behind(rest)}S'
     if not date and not time:
         return 'PT0S'
     return f'{sign}P{date}' + (f'T{time}' if time else '')
@@ -205,14 +204,38 @@ def duration_order(first: Duration, second: Duration) -> int | None:
 def _end(reference: tuple[int, int], duration: Duration) -> int | Fraction:
     """Return when a duration that begins with a month ends, in seconds since 0001-01-01."""
     year, month = divmod(reference[0] * 12 + reference[1] - 1 + duration[1], 12)
-    return _days(year, month + 1, 1) * _DAY + duration[2]
+    return _days(year, month + 1, 1) * DAY + duration[2]
 
 
-def _whole(number: Fraction) -> int | Fraction:
+def on_calendar(seconds: int | Fraction) -> tuple[int, int, int, int | Fraction]:
+    """Return year, month, day and the seconds of the day, of seconds since 0001-01-01."""
+    days, rest = divmod(seconds, DAY)
+    cycles, day = divmod(int(days), _CYCLE_DAYS)
+    date = datetime.date.fromordinal(day + 1)
+    return date.year + cycles * _CYCLE_YEARS, date.month, date.day, rest
+
+
+def days_of_month(year: int, month: int) -> tuple[int, int]:
+    """Return the days between 0001-01-01 and the first of a month, and how many days it has."""
+    first = _days(year, month, 1)
+    return first, _days(year + month // 12, month % 12 + 1, 1) - first
+
+
+def decimal(number: Fraction) -> int | Fraction:
+    """Return a number as a decimal has it: with 30 digits behind the point where it needs more."""
+    rest = number.denominator
+    for factor in (2, 5):
+        while rest % factor == 0:
+            rest //= factor
+    return whole(number if rest == 1 else round(number, DIGITS))
+
+
+def whole(number: Fraction) -> int | Fraction:
+    """Return a number as an integer where it is one."""
     return number.numerator if number.denominator == 1 else number
 
 
-def _digits_behind(number: int | Fraction) -> str:
+def digits_behind(number: int | Fraction) -> str:
     """Return the digits of a decimal behind its whole part, with the point; '' without any."""
     fraction = number - math.floor(number)
     if not fraction:

@@ -1,6 +1,6 @@
 """SWRL built-ins over values (https://www.w3.org/Submission/SWRL/, section 8): comparisons,
-arithmetic, booleans, strings and URIs. Those that compute with dates and lists are not supported
-and reported as such; values of XML Schema's dates, times and durations are compared.
+arithmetic, booleans, strings and URIs; `calendar_builtins` has dates, times and durations. Those
+that compute with lists are not supported and reported as such.
 
 Each built-in is known by two functions of the values of its arguments: whether they satisfy it,
 and, for those that compute, the values its first argument can take given the others. Arguments
@@ -19,6 +19,7 @@ from fractions import Fraction
 from typing import Any
 from urllib.parse import urljoin, urlsplit
 
+from owl_reasoner.reasoner.calendar_builtins import CALENDAR_BUILTINS
 from owl_reasoner.reasoner.datatypes import (
     Value,
     floating_value,
@@ -28,9 +29,8 @@ from owl_reasoner.reasoner.datatypes import (
     schema_pattern,
     single,
 )
+from owl_reasoner.reasoner.datetimes import decimal
 
-DIGITS = 30
-"""Digits behind the point of a quotient; XPath asks for 18 in all at least."""
 _Number = int | Fraction | float
 _Solve = Callable[..., Iterable[Value]]
 
@@ -102,16 +102,8 @@ def _divide(first: _Number, second: _Number) -> _Number:
             sign = math.copysign(1.0, first) * math.copysign(1.0, second)
             return math.nan if first == 0.0 or math.isnan(first) else sign * math.inf
         return first / second
-    return _decimal(Fraction(first) / Fraction(second))
-
-
-def _decimal(number: Fraction) -> Fraction:
-    """Round what no decimal is equal to: a quotient of decimals is a decimal (XPath, op 6.2.4)."""
-    rest = number.denominator
-    for factor in (2, 5):
-        while rest % factor == 0:
-            rest //= factor
-    return number if rest == 1 else round(number, DIGITS)
+    # A quotient of decimals is a decimal (XPath, op 6.2.4).
+    return decimal(Fraction(first) / Fraction(second))
 
 
 def _modulo(first: _Number, second: _Number) -> _Number:
@@ -128,7 +120,7 @@ def _power(base: _Number, exponent: _Number) -> _Number:
         return _floating_power(float(base), float(exponent))
     if not isinstance(exponent, int) or abs(exponent) > 1024:
         raise ValueError
-    return _decimal(Fraction(base) ** exponent)
+    return decimal(Fraction(base) ** exponent)
 
 
 def _floating_power(base: float, exponent: float) -> float:
@@ -203,6 +195,16 @@ def _strings(compute: Callable[..., Value | None]) -> _Solve:
         except (TypeError, ValueError, AttributeError, LookupError):
             return ()
         return () if result is None else (result,)
+
+    return solve
+
+
+def _calendar(compute: Callable[..., Value]) -> _Solve:
+    def solve(*arguments: Value) -> Iterable[Value]:
+        try:
+            return (compute(*arguments),)
+        except (ArithmeticError, ValueError):
+            return ()
 
     return solve
 
@@ -411,6 +413,10 @@ _COMPUTATIONS: dict[str, tuple[int, int, _Solve]] = {
     'replace': (4, 4, _strings(_replace)),
     'tokenize': (3, 3, _tokens),
     'resolveURI': (3, 3, _strings(_resolved)),
+    **{
+        name: (fewest, most, _calendar(compute))
+        for name, (fewest, most, compute) in CALENDAR_BUILTINS.items()
+    },
 }
 
 

@@ -269,6 +269,11 @@ class ValueSet:
             return self
         if self is EVERY:
             return other
+        # Most sets that a search compares are of one value.
+        for one, them in ((self, other), (other, self)):
+            value = one.__dict__.get('only')
+            if value is not None:
+                return one if them.contains(value) else NONE
         return ValueSet(
             {
                 name: _common(found, other.intervals[name])
@@ -452,8 +457,11 @@ def point(value: Value) -> ValueSet:
     """Return the set of one value."""
     space, key = _place(value)
     if space in _ORDERED:
-        return ValueSet({space: ((_below(key), _above(key)),)}, {})
-    return ValueSet({}, {space: _listed([value])})
+        found = ValueSet({space: ((_below(key), _above(key)),)}, {})
+    else:
+        found = ValueSet({}, {space: _listed([value])})
+    found.only, found.size = value, 1
+    return found
 
 
 def _place(value: Value) -> tuple[str, Any]:

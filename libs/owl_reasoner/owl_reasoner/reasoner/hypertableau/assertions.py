@@ -13,10 +13,10 @@ from owl_reasoner.reasoner.clauses import UnsupportedError
 from owl_reasoner.reasoner.datatypes import value_of
 from owl_reasoner.reasoner.hypertableau.dl_clauses import ANYBODY, DLClauses
 from owl_reasoner.reasoner.hypertableau.model import CaseModel
-from owl_reasoner.reasoner.value_sets import point
+from owl_reasoner.reasoner.value_sets import ValueSet, point
 
-Prepared: TypeAlias = tuple[Axiom, int]
-"""An assertion, and the concept that it gives."""
+Prepared: TypeAlias = tuple[Axiom, int | ValueSet]
+"""An assertion, and the concept or value that it gives."""
 
 
 class AssertionWriter:
@@ -55,8 +55,10 @@ class AssertionWriter:
         for assertion in axioms:
             self.state(model, *assertion)
 
-    def prepared(self, axiom: Axiom) -> tuple[Axiom, int]:
-        """Return an assertion, a negative one as that of a class, and the concept it gives."""
+    def prepared(self, axiom: Axiom) -> Prepared:
+        """Return an assertion, a negative one as that of a class, and what it gives."""
+        if isinstance(axiom, ax.DataPropertyAssertion):
+            return axiom, point(value_of(axiom.literal))
         if isinstance(axiom, ax.NegativeObjectPropertyAssertion):
             other = ex.ObjectComplementOf(ex.ObjectOneOf((axiom.object,)))
             axiom = ax.ClassAssertion(ex.ObjectAllValuesFrom(axiom.prop, other), axiom.subject)
@@ -71,7 +73,7 @@ class AssertionWriter:
             self._gaps[f'assertions of {expression_text(axiom.cls)}: {reason}'] = None
             return axiom, ANYBODY
 
-    def state(self, model: CaseModel, axiom: Axiom, concept: int) -> None:
+    def state(self, model: CaseModel, axiom: Axiom, given: int | ValueSet) -> None:
         """State an assertion, whose concept is made.
 
         It rests on the choices by which its individuals are the same as others.
@@ -79,14 +81,16 @@ class AssertionWriter:
         self._rules.budget.tick()
         if isinstance(axiom, ax.ClassAssertion):
             x, choices = model.individual(axiom.individual)
-            model.concept(x, concept, choices)
+            assert isinstance(given, int)
+            model.concept(x, given, choices)
         elif isinstance(axiom, ax.ObjectPropertyAssertion):
             x, choices = model.individual(axiom.subject)
             y, more = model.individual(axiom.object)
             model.relate(x, self._rules.roles.number(axiom.prop), y, choices | more)
         elif isinstance(axiom, ax.DataPropertyAssertion):
             x, choices = model.individual(axiom.subject)
-            model.value(x, axiom.prop, point(value_of(axiom.literal)), choices)
+            assert isinstance(given, ValueSet)
+            model.value(x, axiom.prop, given, choices)
         elif isinstance(axiom, ax.SameIndividual):
             first, *others = sorted(axiom.individuals)
             x, choices = model.individual(first)

@@ -42,6 +42,10 @@ _About = tuple[str, str]
 """What an assertion is about: a class or property, and the subject."""
 
 
+_ANYBODY = ''
+"""In place of the subject: whoever it is."""
+
+
 def _about(axiom: Axiom) -> _About | None:
     """Return what a plain assertion is about; None for any other axiom."""
     if isinstance(axiom, ax.ClassAssertion):
@@ -53,11 +57,17 @@ def _about(axiom: Axiom) -> _About | None:
 
 
 class ChangeHistory:
-    """Learns which assertions change: those about something that was retracted before."""
+    """Learns which assertions change: those about something that was retracted before.
+
+    Where values of one property were retracted of two individuals, all of its values count: a
+    patrol visits one place after the other. Relations do not, for what follows from them reaches
+    further, and has to be stated again with each change.
+    """
 
     def __init__(self) -> None:
         self._turn = 0
         self._last: dict[_About, int] = {}
+        self._subject: dict[str, str] = {}
 
     def note(self, removed: Iterable[Axiom]) -> None:
         """Take in what one change retracts."""
@@ -66,6 +76,11 @@ class ChangeHistory:
             about = _about(axiom)
             if about is not None:
                 self._last[about] = self._turn
+            if about is not None and isinstance(axiom, ax.DataPropertyAssertion):
+                prop, subject = about
+                if self._subject.setdefault(prop, subject) != subject:
+                    self._last[prop, _ANYBODY] = self._turn
+                    self._subject[prop] = subject
 
     def forget(self) -> None:
         """Forget what changed long ago."""
@@ -73,7 +88,8 @@ class ChangeHistory:
         self._last = {about: turn for about, turn in self._last.items() if turn > oldest}
 
     def __contains__(self, axiom: Axiom) -> bool:
-        return _about(axiom) in self._last
+        about = _about(axiom)
+        return about is not None and (about in self._last or (about[0], _ANYBODY) in self._last)
 
 
 def is_plain(axioms: Iterable[Axiom]) -> bool:
@@ -196,7 +212,8 @@ class IncrementalCases:
         return not named and not self._undecided()
 
     def _model(self) -> KeptModel:
-        model = KeptModel(self._rules, self._writer, self._most_steps)
+        valued = (a.subject for a in self._changing if isinstance(a, ax.DataPropertyAssertion))
+        model = KeptModel(self._rules, self._writer, self._most_steps, valued)
         self._models.append(model)
         return model
 

@@ -29,6 +29,8 @@ class KeptModel:
         rules: What the axioms say.
         writer: States assertions.
         most_steps: When a search is given up, for each change anew.
+        valued: Individuals whose values change: below, they have none that only must exist, which
+            would have to be made one with the known values above at each change.
 
     Attributes:
         search: Where the model is.
@@ -39,8 +41,10 @@ class KeptModel:
         is_flat: Whether no choices are kept below the changing assertions.
     """
 
-    def __init__(self, rules: DLClauses, writer: AssertionWriter, most_steps: int) -> None:
-        self._rules, self._writer = rules, writer
+    def __init__(
+        self, rules: DLClauses, writer: AssertionWriter, most_steps: int, valued: Iterable[str]
+    ) -> None:
+        self._rules, self._writer, self._valued = rules, writer, tuple(valued)
         self.search = CaseSearch(rules, most_steps)
         self.reader = ModelFacts(rules, self.search)
         self.lasting: dict[str, dict[Axiom, Choices]] = {}
@@ -58,9 +62,10 @@ class KeptModel:
         """State the lasting assertions and find a model of them; False: there is none."""
         search = self.search
         begin = partial(self._writer.begin, search.model, lasting)
-        if not (search.attempt(begin) and search.settle()):
+        if not search.attempt(begin):
             return False
-        return self.choose()
+        search.await_values(self._valued)
+        return search.settle() and self.choose()
 
     def choose(self) -> bool:
         """Find a model of what is stated, and keep to its choices."""
@@ -122,6 +127,7 @@ class KeptModel:
 
     def _state(self, changing: tuple[Prepared, ...]) -> bool:
         def state() -> None:
+            self.search.make_values(self._valued)
             for assertion in changing:
                 self._writer.state(self.search.model, *assertion)
 

@@ -76,6 +76,7 @@ class CaseModel:
         self.queue: list[tuple[int, ...]] = []
         self.recount: dict[int, None] = {}
         self.revalue: dict[int, None] = {}
+        self.rejoin: dict[int, None] = {}
 
     # --- changes that can be taken back ---
 
@@ -109,6 +110,7 @@ class CaseModel:
         self.queue.clear()
         self.recount.clear()
         self.revalue.clear()
+        self.rejoin.clear()
 
     def changed_since(self, mark: int) -> Iterator[tuple[dict[Any, Any], Any]]:
         """Yield the entries, as pairs of table and key, that changed since a state."""

@@ -298,6 +298,8 @@ class CaseJoins:
         """Return what an individual is related to (`end`, where it is known), by which choices."""
         model = self._model
         if isinstance(atom, OfProp):
+            if x in model.rejoin:
+                return  # Its values are new, and joined with all others when it is their turn.
             for v in model.values[x]:
                 if atom.prop in model.props[v]:
                     yield v, model.props[v][atom.prop]

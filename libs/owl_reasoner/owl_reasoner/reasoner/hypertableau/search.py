@@ -169,6 +169,16 @@ class CaseSearch:
             return False
         return True
 
+    def await_values(self, names: Iterable[str]) -> None:
+        """Make no values that must exist for certain individuals, until `make_values`."""
+        self._values.waiting = {self.model.individual(name)[0] for name in names}
+
+    def make_values(self, names: Iterable[str]) -> None:
+        """Make the values that must exist and are not known, of these individuals as of others."""
+        self._values.waiting.clear()
+        found = (self.model.individual(name)[0] for name in names)
+        self.model.revalue.update(dict.fromkeys(x for x in found if not self.model.is_gone(x)))
+
     def settle(self) -> bool:
         """Derive what needs no cases; False on a contradiction."""
         return self.attempt(self._saturate)
@@ -189,9 +199,9 @@ class CaseSearch:
 
     def _saturate(self) -> None:
         model = self.model
-        queue, recount, revalue, is_gone = model.queue, model.recount, model.revalue, model.is_gone
-        budget = model.budget
-        while queue or recount or revalue:
+        queue, recount, is_gone = model.queue, model.recount, model.is_gone
+        revalue, rejoin, budget = model.revalue, model.rejoin, model.budget
+        while queue or recount or revalue or rejoin:
             while queue:
                 # The newest first: a contradiction is met before all else that follows is.
                 event = queue.pop()
@@ -213,6 +223,12 @@ class CaseSearch:
                 x, _ = revalue.popitem()
                 if not is_gone(x):
                     self._values.check(x)
+                    rejoin[x] = None
+            elif rejoin:
+                # Rules after everybody's values: a value that must exist may be one that is known,
+                # and then no rule has to ask which one it is.
+                x, _ = rejoin.popitem()
+                if not is_gone(x):
                     self._named.on_values(x)
 
     # --- choices ---

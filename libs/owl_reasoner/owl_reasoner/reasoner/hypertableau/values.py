@@ -29,18 +29,21 @@ class CaseValues:
 
     Attributes:
         gaps: What was not decided.
+        waiting: Individuals for whom no value is made yet that must exist: known ones come first.
     """
 
     def __init__(self, model: CaseModel, either: Either) -> None:
         self._model, self._rules, self._either = model, model.rules, either
         self._made: dict[tuple[int, int], bool] = {}
         self.gaps: dict[str, None] = {}
+        self.waiting: set[int] = set()
 
     def check(self, x: int) -> None:
         """Apply all rules to an individual's values."""
         model, rules, labels = self._model, self._rules, self._model.labels[x]
-        for concept in rules.values_at_least.keys() & labels.keys():
-            self._need(x, concept, rules.values_at_least[concept])
+        if x not in self.waiting:
+            for concept in rules.values_at_least.keys() & labels.keys():
+                self._need(x, concept, rules.values_at_least[concept])
         for v in tuple(model.values[x]):
             self._apply_rules(x, v)
         self._join_known(x)
