@@ -15,7 +15,7 @@ from armor_service.rendering import shown
 from strict_files.settings import names_expected, parameter
 
 CODE = Path(__file__).resolve().parent.parent
-ONTOLOGY_ENDINGS = ('.nt', '.omn', '.owl', '.owx', '.rdf', '.ttl', '.xml')
+ONTOLOGY_ENDINGS = ('.nq', '.nt', '.omn', '.owl', '.owx', '.rdf', '.ttl', '.xml')
 LOG_ENDINGS = ('.log', '.txt')
 WORLD_ENDINGS = ('.sqlite3',)
 MAX_PATH = 4096

@@ -283,7 +283,7 @@ def test_a_header_has_values_of_declared_properties() -> None:
     assert set(again.axioms) >= set(document.axioms)
 
 
-@pytest.mark.parametrize('form', ['rdfxml', 'ntriples'])
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples', 'nquads'])
 def test_a_value_stays_one_where_the_header_has_its_property_too(form: str) -> None:
     text = '<http://x/> :title "Rooms" . :i :title "Hall" .'
     axioms = read_turtle(text).axioms

@@ -410,7 +410,7 @@ def test_what_older_documents_say_is_read(text, axiom):
         '@prefix owl: <http://www.w3.org/2002/07/owl#> . [] a owl:Ontology ; <urn:n> "x" .',
     ],
 )
-@pytest.mark.parametrize('form', ['rdfxml', 'ntriples', 'manchester'])
+@pytest.mark.parametrize('form', ['rdfxml', 'ntriples', 'nquads', 'manchester'])
 def test_what_is_said_of_an_ontology_without_a_name_stays_said_of_it(text, form):
     said = ax.AnnotationAssertion('urn:n', IRI, ex.Literal('x'))
     document = read_ontology(text.encode(), IRI)

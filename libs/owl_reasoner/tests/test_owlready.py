@@ -14,7 +14,8 @@ import owlready2
 import pytest
 from owlready2 import AllDisjoint, FunctionalProperty, Imp, Not, SymmetricProperty, Thing
 
-from owl_reasoner import sync_reasoner_native
+from owl_reasoner import read_ontology, sync_reasoner_native
+from owl_reasoner.documents.xml_reading import OntologyFileError
 from owl_reasoner.owl.axioms import Axiom, Declaration
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, XSD
@@ -392,3 +393,26 @@ def test_owlready2s_own_ontologies_come_out_as_with_pellet(path: Path) -> None:
             pytest.skip(f'Pellet does not run: {str(error)[-80:]}')
         world.close()
     assert results[0] == results[1]
+
+
+def test_a_world_that_owlready2_writes_as_n_quads_is_read_by_the_iri_of_its_ontology(
+    shop: Shop, tmp_path: Path
+) -> None:
+    path = tmp_path / 'shop.nq'
+    sync_reasoner_native(shop.world)
+    shop.world.save(str(path), format='nquads')
+    found = read_ontology(path, IRI.rstrip('#'))
+    assert (found.format, found.iri) == ('nquads', IRI.rstrip('#'))
+    told = read_axioms(shop.world, [shop.onto.graph.c]).axioms
+    assert {*found.axioms} == {*told}
+    with pytest.raises(OntologyFileError, match=r'one named <urn:x>, got <.*>, <http://inferr'):
+        read_ontology(path, 'urn:x')
+
+
+def test_n_quads_of_one_graph_are_read_whatever_it_is_named() -> None:
+    triple = f'<urn:a> <{RDF}type> <{OWL}NamedIndividual>'
+    for graph in ('', ' <urn:g>'):
+        document = read_ontology(f'{triple}{graph} .\n'.encode(), 'urn:x')
+        assert document.axioms == [Declaration('individual', 'urn:a')]
+    with pytest.raises(OntologyFileError, match='not N-Quads'):
+        read_ontology(f'{triple} <urn:g> .\n{triple} <urn:g> <urn:h> .\n'.encode(), 'urn:x')

@@ -33,7 +33,7 @@ from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axioms import Axiom, Rule
 from owl_reasoner.reasoner.budget import ReasoningBudgetError
 
-_BY_ENDING = {'.nt': 'ntriples', '.omn': 'manchester'}
+_BY_ENDING = {'.nt': 'ntriples', '.nq': 'nquads', '.omn': 'manchester'}
 """What SAVE writes by the ending of the path."""
 RELEASE_AFTER = 0.2
 DROP_WITHIN = 0.5
@@ -193,8 +193,8 @@ def _release(workspace: Workspace, ref: Reference) -> None:
     'Written beside the file and renamed, so that a crash leaves the old file whole; it keeps its '
     'rights, and a read-only one is refused. '
     'Turtle and JSON-LD are written as N-Triples, OWL/XML and functional syntax as RDF/XML; a path '
-    'that ends in .nt gets N-Triples, which hold names that RDF/XML cannot, and one that ends in '
-    '.omn Manchester syntax.',
+    'that ends in .nt or .nq gets N-Triples or N-Quads, which hold names that RDF/XML cannot, and '
+    'one that ends in .omn Manchester syntax.',
     slow=True,
 )
 def _save(workspace: Workspace, request: DirectiveRequest, path: str) -> DirectiveResponse:

@@ -1,7 +1,8 @@
 """Reading an ontology document into axioms, with exact datatypes and the place of every error.
 
-pyoxigraph reads Turtle, N-Triples and JSON-LD. What XML and the functional syntax say is read by
-this package, so that errors name their place also where the syntax is good and the OWL is not.
+pyoxigraph reads Turtle, N-Triples, N-Quads and JSON-LD. What XML and the functional syntax say is
+read by this package, so that errors name their place also where the syntax is good and the OWL is
+not.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from owl_reasoner.documents.functional_syntax import is_functional, parse_functi
 from owl_reasoner.documents.manchester import ManchesterDocument
 from owl_reasoner.documents.mapping import RdfMapper
 from owl_reasoner.documents.owl_xml import is_owl_xml, parse_owl_xml
-from owl_reasoner.documents.rdf_xml import Graph, Node, parse_rdf_xml
+from owl_reasoner.documents.rdf_xml import Graph, Node, Triple, parse_rdf_xml
 from owl_reasoner.documents.structural import Axioms
 from owl_reasoner.documents.xml_reading import OntologyFileError, is_absolute, legal
 from owl_reasoner.gc_control import collected, uncollected
@@ -47,11 +48,19 @@ _TRIPLE = re.compile(
 _TURTLE = re.compile(rb'@(?:prefix|base)\b|(?:prefix|base)\s|<|_:|\[|\(', re.IGNORECASE)
 _MANCHESTER = re.compile(rb'(?:Prefix|Namespace|Ontology|Import|Class|Individual|\w+Property):\s')
 _PARSER_PLACE = re.compile(r'Parser error (?:at|between) line [\w ]*: ')
-_NAMES = {'turtle': 'Turtle', 'ntriples': 'N-Triples', 'jsonld': 'JSON-LD'}
-FORMATS = 'RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, OWL functional syntax or Manchester syntax'
+_NAMES = {
+    'turtle': 'Turtle',
+    'ntriples': 'N-Triples',
+    'nquads': 'N-Quads',
+    'jsonld': 'JSON-LD',
+}
+FORMATS = (
+    'RDF/XML, OWL/XML, Turtle, N-Triples, N-Quads, JSON-LD, OWL functional syntax or Manchester '
+    'syntax'
+)
 PACKAGE_DEPTH = 6
 """Folders above a document in which a package is looked for."""
-_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.jsonld', '.omn')
+_ENDINGS = ('.owl', '.rdf', '.ttl', '.ofn', '.owx', '.xml', '.nt', '.nq', '.jsonld', '.omn')
 DEFAULT_SIZE_LIMIT = 256 * 1024 * 1024
 
 
@@ -62,7 +71,8 @@ class OntologyDocument:
     Attributes:
         axioms: In document order, without repeats.
         unsupported: One sentence for each statement that was not understood.
-        format: 'rdfxml', 'ntriples', 'owlxml', 'turtle', 'jsonld', 'functional' or 'manchester'.
+        format: 'rdfxml', 'ntriples', 'nquads', 'owlxml', 'turtle', 'jsonld', 'functional' or
+            'manchester'.
         iri: The IRI in the document's owl:Ontology header, '' without one.
         prefixes: Namespace prefixes declared by the document.
     """
@@ -84,8 +94,9 @@ def read_ontology(
 ) -> OntologyDocument:
     """Read a document and the documents beside it that it imports.
 
-    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, OWL
-    functional syntax or Manchester syntax. An import is followed where a file of its name (with any
+    Its format is told by how it begins: RDF/XML, OWL/XML, Turtle, N-Triples, N-Quads, JSON-LD, OWL
+    functional syntax or Manchester syntax. Of N-Quads the graph that `iri` names is read, or the
+    only one, and what is in no graph. An import is followed where a file of its name (with any
     ending) lies in the folder of the document, where a catalog says where it is (`catalogs`), or
     where it is a file
     IRI; its axioms then take the place of the import.
@@ -231,14 +242,14 @@ def _parsed(data: bytes, iri: str) -> tuple[str, RdfMapper | Axioms]:
     if is_functional(data):
         return 'functional', parse_functional(_text(data), iri)
     if _TRIPLE.match(data, place):
-        try:
-            return 'ntriples', RdfMapper(_rdf_text(data, iri, 'ntriples'), iri)
-        except OntologyFileError as error:
-            # Turtle can begin so as well.
+        # All three can begin so; what came farthest tells what is wrong.
+        errors: list[OntologyFileError] = []
+        for form in ('ntriples', 'nquads', 'turtle'):
             try:
-                return 'turtle', RdfMapper(_rdf_text(data, iri, 'turtle'), iri)
-            except OntologyFileError as other:
-                raise max(error, other, key=lambda e: e.line) from None
+                return form, RdfMapper(_rdf_text(data, iri, form), iri)
+            except OntologyFileError as error:
+                errors.append(error)
+        raise next((e for e in errors if not e.line), max(errors, key=lambda e: e.line)) from None
     if _XML.match(data, place):
         if is_owl_xml(data):
             return 'owlxml', parse_owl_xml(data, iri)
@@ -290,7 +301,7 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     Args:
         data: The document.
         iri: Base for relative IRIs where the document gives none.
-        form: 'turtle', 'ntriples' or 'jsonld'.
+        form: 'turtle', 'ntriples', 'nquads' or 'jsonld'.
 
     Raises:
         OntologyFileError: Not of that format, or with statements that are no plain triples.
@@ -301,20 +312,25 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
     source = {
         'turtle': pyoxigraph.RdfFormat.TURTLE,
         'ntriples': pyoxigraph.RdfFormat.N_TRIPLES,
+        'nquads': pyoxigraph.RdfFormat.N_QUADS,
         'jsonld': pyoxigraph.RdfFormat.JSON_LD,
     }[form]
     graph = Graph()
+    graphs: dict[str, list[Triple]] = {}
     names = _NodeNames(graph.unsupported)
     properties: set[str] = set()
     default = pyoxigraph.DefaultGraph()
     literal, triple = pyoxigraph.Literal, pyoxigraph.Triple
     try:
-        base = None if form == 'ntriples' else iri
+        base = None if form in ('ntriples', 'nquads') else iri
         # Lenient: names that are no IRIs, which JSON-LD would drop in silence, come as they are.
         for quad in pyoxigraph.parse(data, format=source, base_iri=base, lenient=True):
             subject, predicate, node, of_graph = quad
+            triples = graph.triples
             if of_graph != default:
-                raise OntologyFileError('named graphs are not read')
+                if form != 'nquads':
+                    raise OntologyFileError('named graphs are not read')
+                triples = graphs.setdefault(names[str(of_graph)], [])
             value: Node
             if isinstance(node, literal):
                 language = node.language
@@ -337,11 +353,27 @@ def _rdf_text(data: bytes, iri: str, form: str) -> Graph:
                     graph.unsupported.append(f'{what}: its property {says!r} is no IRI')
                     continue
                 properties.add(says)
-            graph.triples.append((about, says, value))
+            triples.append((about, says, value))
     except SyntaxError as error:
         message = _PARSER_PLACE.sub('', str(error.msg), count=1)
         place = error.lineno or 0, error.offset or 0
         raise OntologyFileError(f'not {_NAMES[form]}: {message}', *place) from None
+    if graphs:
+        graph.triples += graphs[_graph_of(iri, graphs)]
     if not graph.triples:
         raise OntologyFileError(f'not {_NAMES[form]}: it states nothing')
     return graph
+
+
+def _graph_of(iri: str, graphs: Iterable[str]) -> str:
+    """Return the named graph that an ontology is; owlready2 names it with what ends its IRI.
+
+    Raises:
+        OntologyFileError: There are several, and none is named so.
+    """
+    named = [name for name in graphs if name.rstrip('#/') == iri.rstrip('#/')]
+    found = named or [*graphs]
+    if len(found) > 1:
+        shown = ', '.join(f'<{name}>' for name in found[:5])
+        raise OntologyFileError(f'expected one graph, or one named <{iri}>, got {shown}')
+    return found[0]

@@ -25,7 +25,7 @@ from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
 from strict_files.suggestions import nearest
 
-FORMATS = ('rdfxml', 'ntriples', 'manchester')
+FORMATS = ('rdfxml', 'ntriples', 'nquads', 'manchester')
 _XML = ('http://www.w3.org/XML/1998/namespace', 'http://www.w3.org/2000/xmlns/')
 _PREFIXES = {'rdf': RDF, 'rdfs': RDFS, 'owl': OWL, 'xsd': XSD, 'swrl': SWRL}
 _LOCAL = re.compile(r'[^\W\d][\w.\-]*')
@@ -75,6 +75,8 @@ def ontology_bytes(
     triples = triples_of(axioms, iri)
     if format == 'ntriples':
         return ''.join(map(_ntriple, triples)).encode()
+    if format == 'nquads':
+        return ''.join(f'{_ntriple(triple)[:-2]}<{iri}> .\n' for triple in triples).encode()
     if format == 'rdfxml':
         return _RdfXml(list(triples), iri, prefixes or {}).document().encode()
     raise OntologyFileError(f'format {format!r}: expected {nearest(format, FORMATS)}')
