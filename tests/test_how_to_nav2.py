@@ -44,7 +44,8 @@ def test_its_profile_is_one() -> None:
     profile = read_profile(ROOT / 'config' / 'robots' / 'nav2.yaml').profile
     assert profile.dock.navigator == 'nav2'
     known = {'topics', 'frames', 'types', 'body', 'drive', 'battery', 'dock'}
-    named = set(re.findall(r'\| `(\w+)', PAGE.partition('| Key |')[2].partition('\n\n')[0]))
+    table = PAGE.partition('| Key |')[2].partition('\n\n')[0]
+    named = set(re.findall(r'^\| `(\w+)', table, re.MULTILINE))
     assert named <= known
 
 
@@ -59,7 +60,7 @@ def test_its_options_are_those_of_the_commands() -> None:
         words = [sys.executable, 'launch.py', *filter(None, [command]), '--help']
         said = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
         for line in PAGE.splitlines():
-            if line.startswith(f'python3 launch.py {command}'.rstrip()):
+            if line.startswith(f'python3 launch.py {command or "--"}'):
                 for option in re.findall(r'--[a-z]+', line):
                     assert option in said, (line, option)
 
