@@ -17,7 +17,7 @@ from surveillance_runtime.conversions import seconds_of, stamp_from
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.record import Frames
 from surveillance_runtime.qos import SENSOR_QOS
-from surveillance_runtime.sensing import sensors
+from surveillance_runtime.sensing import sensors, silence
 from surveillance_runtime.sensing.sensors import OdometryReader, SensorStream
 from surveillance_runtime.sensing.transforms import TELL_WITHIN, ScanReader
 from tests.controllers.test_navigation_topics import motion_of
@@ -153,3 +153,21 @@ def test_a_scan_waits_a_while_for_where_its_frame_is(graph: Any, monkeypatch: An
     come()
     assert mounts[1:] == [(0.0, 0.0, 0.0)]
     graph.until(lambda: any("its frame 'other' is on the robot is not known" in e for e in said))
+
+
+def test_odometry_of_another_frame_is_told_while_the_robot_drives(
+    graph: Any, monkeypatch: Any
+) -> None:
+    monkeypatch.setattr(silence, 'DOUBT_PERIOD', 0.05)
+    node = graph.add(PatrolNode, name='driving')
+    frames = Frames(base='base_link')
+    reader = OdometryReader(node, lambda _pose, _at: None)
+    silence.SensorWatch(node, frames, {}, reader.stream, child=lambda: reader.child)
+    topic = graph.node.create_publisher(Odometry, 'odom', SENSOR_QOS)
+
+    def told() -> list[str]:
+        topic.publish(Odometry(child_frame_id='base_footprint'))
+        return [each.text for each in node.incidents.updates() if 'child_frame_id' in each.text]
+
+    graph.until(told)
+    assert "the profile says frames.base: 'base_link'" in told()[0]

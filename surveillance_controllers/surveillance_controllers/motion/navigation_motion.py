@@ -142,6 +142,7 @@ class NavigationMotion:
             self._lidar.streams,
             self._odometry.stream,
             lambda: 'map' in self._navigator.awaits,
+            lambda: self._odometry.child,
         )
 
     def follow(self, path: Points, run: GoalRun, report: Callable[[Points], None]) -> Points:

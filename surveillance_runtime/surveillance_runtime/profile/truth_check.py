@@ -54,6 +54,11 @@ class Doubt:
     value: str = ''
 
     @property
+    def topic(self) -> str:
+        """The topic that it is about, with which its text begins."""
+        return self.text.partition(': ')[0]
+
+    @property
     def line(self) -> str:
         """The line of the profile; empty: none helps."""
         part, _, name = self.key.rpartition('.')
@@ -256,8 +261,8 @@ def _of_frames(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
             f'tf: another program tells {frames.map} -> {frames.odom} (amcl, slam_toolbox), and '
             'the patrol would as well: end it, or let Nav2 drive (dock.navigator: nav2)'
         )
-    for index, row in enumerate(zip(*[iter(profile.lidars.mounts)] * 4, strict=True)):
-        topic = profile.topics.scans[index]
+    rows = zip(*[iter(profile.lidars.mounts)] * 4, strict=True)
+    for topic, row in zip(profile.topics.scans, rows, strict=False):
         heard = seen.heard.get(named(topic, namespace))
         at = None if heard is None else seen.places.get(heard.frame.removeprefix('/'))
         if at is None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from lidar_navigation.geometry import Pose, composed, relative
@@ -132,6 +133,7 @@ class OdometryReader:
     Attributes:
         stream: What comes.
         reading: The last reading as the driver told it; None: none came.
+        child: The child frame that the first message names; empty: none came, or it names none.
     """
 
     def __init__(
@@ -145,6 +147,7 @@ class OdometryReader:
         self._node = node
         self._take = take
         self._by_tf: Subscription | None = None
+        self.child = ''
         self._scale = node.declare_fields(OdometryScale(), prefix='odometry.')
         self._scaled: tuple[Pose, float] | None = None
         StateSubscription(
@@ -164,6 +167,8 @@ class OdometryReader:
             node.create_timer(BY_TF_AFTER, self._look_for_topic, clock=steady)
 
     def _on_odometry(self, serialized: bytes) -> None:
+        if self.stream.came_at is None:
+            self.child = deserialize_message(serialized, Odometry).child_frame_id
         with conversions.refusing(self._node, 'odom'):
             measured = self.stream.come(stamp_of_serialized(serialized), serialized)
             if measured is not None:

@@ -12,10 +12,14 @@ from surveillance_runtime.alarms import SILENT_AFTER
 from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.incidents import Incidents, Severity
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.profile.check_up import awaited
+from surveillance_runtime.profile.check_up import GraphSample, TopicSample, awaited
 from surveillance_runtime.profile.record import Frames, RobotProfile, Topics
+from surveillance_runtime.profile.truth_check import doubts
 from surveillance_runtime.sensing import conversions
 from surveillance_runtime.sensing.sensors import SensorStream
+
+DOUBT_PERIOD = 5.0
+"""Seconds of real time between two looks whether what comes can be true."""
 
 
 class SilenceWatch:
@@ -57,6 +61,7 @@ class SensorWatch:
         lidars: What comes of each lidar, by the topic's name.
         odometry: What comes on `odom`.
         awaits_map: Returns whether the map has not come yet; None: the node needs none.
+        child: Returns the odometry's child frame; empty: not known.
     """
 
     def __init__(
@@ -66,6 +71,7 @@ class SensorWatch:
         lidars: Mapping[str, SensorStream],
         odometry: SensorStream,
         awaits_map: Callable[[], bool] | None = None,
+        child: Callable[[], str] = lambda: '',
     ) -> None:
         streams = {each.topic: each for each in (*lidars.values(), odometry)}
         map_topic = str(node.resolve_topic_name('map'))
@@ -88,5 +94,27 @@ class SensorWatch:
 
         self._inputs = InputWatch(node, wanted, missing, refused)
         self._silence = SilenceWatch(node.incidents, streams.values())
+        self._node, self._profile = node, replace(RobotProfile(), topics=topics, frames=frames)
+        self._streams, self._child = streams, child
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(1.0, lambda: self._silence.look(time.monotonic()), clock=steady)
+        node.create_timer(DOUBT_PERIOD, self._doubt, clock=steady)
+
+    def _doubt(self) -> None:
+        """Doubt what comes, as `doctor` does; `StateSubscription` tells of a second publisher."""
+        heard = {}
+        for topic, stream in self._streams.items():
+            if stream.heard_at is None:
+                continue
+            values: dict[str, object] = {'unstamped': stream.stamp == 0.0}
+            # A driver that names no child frame is let be while it drives.
+            values['child'] = self._child() or self._profile.frames.base
+            heard[topic] = TopicSample(1, values=values)
+        found = {
+            doubt.topic: doubt.text for doubt in doubts(self._profile, GraphSample(heard=heard))
+        }
+        for topic in self._streams:
+            if topic in found:
+                self._node.incidents.begin(('robot', f'{topic} is true'), found[topic])
+            else:
+                self._node.incidents.end(('robot', f'{topic} is true'))
