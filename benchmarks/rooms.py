@@ -95,8 +95,8 @@ def door_scores(image: Image, drawn: Image, truth: Labels) -> tuple[int, int, in
 def corrections(found: Labels, truth: Labels) -> int:
     """Return the clicks in the editor that make the found rooms the true ones.
 
-    Found rooms that lie in one true room are joined (two taps each), true rooms in one found room
-    are cut apart (two taps each); each of the two tools is chosen once.
+    Found rooms that lie in one true room are joined (one tap on the door between them), true rooms
+    in one found room are cut apart (two taps each); each of the two tools is chosen once.
     """
     inside = (truth > 0) & (found > 0)
     pairs, areas = np.unique(np.stack([truth[inside], found[inside]]), axis=1, return_counts=True)
@@ -108,7 +108,7 @@ def corrections(found: Labels, truth: Labels) -> int:
         held.setdefault(room, segment_)
     joins = len(home) - len(set(home.values()))
     cuts = sum(home[segment_] != room for room, segment_ in held.items())
-    return 2 * (joins + cuts) + (joins > 0) + (cuts > 0)
+    return joins + 2 * cuts + (joins > 0) + (cuts > 0)
 
 
 def peer(image: Image, resolution: float) -> Labels:

@@ -178,6 +178,8 @@ def read_map(
                 'metres (map_file_resolution; import: --resolution), or the map.yaml beside it'
             )
         return _made(path, path, resolution, tuple(origin) or (0.0, 0.0, 0.0), _Reading())
+    if path.is_file() and (kind := _kind_of(path)):
+        raise FileError(f'{path}: {kind}: expected a map.yaml, or a picture such as PNG')
     if resolution is not None or origin:
         raise FileError(f'{path}: says its own resolution and origin: expected them for a picture')
     file = read_yaml_file(path)
@@ -452,6 +454,16 @@ _KINDS = (
     (b'<!DOCTYPE', 'a web page'),
     (b'<html', 'a web page'),
 )
+
+
+def _kind_of(path: Path) -> str:
+    """Return what a file is by its first bytes, if that is neither a picture nor a text; or ''."""
+    try:
+        with path.open('rb') as file:
+            start = file.read(64)
+    except OSError:
+        return ''
+    return next((said for begin, said in _KINDS if start.lstrip()[: len(begin)] == begin), '')
 
 
 def _what_it_is(path: Path) -> str:

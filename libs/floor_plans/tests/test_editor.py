@@ -232,3 +232,66 @@ def test_a_part_that_was_left_out_becomes_a_room_and_is_left_out_again(tmp_path:
     assert [part.is_outside for part in editor.now.left_out] == [False]
     editor.undo()
     assert len(editor.now.left_out) == 2
+
+
+@pytest.mark.parametrize('kind', ['typed', 'scanned'])
+def test_one_tap_on_a_door_joins_its_rooms_or_walls_it_off(
+    kind: str, request: pytest.FixtureRequest
+) -> None:
+    editor: PlaceEditor = request.getfixturevalue(kind)
+    place = editor.now.plan.place
+    door = next(
+        name
+        for name, rooms in place.doors.items()
+        if {len(place.rooms[room]) for room in rooms} == {1, 4}
+    )
+    small, large = sorted(place.doors[door], key=lambda room: len(place.rooms[room]))
+    areas = {room: int(editor.now.regions.mask(room).sum()) for room in (small, large)}
+    keeps = max(areas, key=areas.__getitem__)
+    editor.apply('join_at', {'name': door})
+    assert door not in editor.now.plan.doors
+    assert keeps in editor.now.plan.place.rooms
+    assert len(editor.now.plan.place.rooms) == len(place.rooms) - 1
+    editor.undo()
+    with pytest.raises(ValueError, match='expected'):
+        editor.apply('wall_off', {'name': door})  # the only way into its room
+    between = next(
+        name
+        for name, rooms in place.doors.items()
+        if all(len(place.rooms[room]) >= 2 for room in rooms)
+        and len(set(place.rooms[rooms[0]]) & set(place.rooms[rooms[1]])) == 1
+    )
+    at = editor.now.plan.doors[between]
+    assert editor.apply('wall_off', {'name': between}) == f'{between} is a wall'
+    assert between not in editor.now.plan.place.doors
+    grid = editor.now.plan.grid()
+    assert not grid.at(grid.free, at.x, at.y)
+    editor.save()
+    assert between not in read_place(editor.path).place.doors
+    with pytest.raises(ValueError, match=f'no door .*{between}|stands nowhere'):
+        editor.apply('wall_off', {'name': between})
+
+
+def test_doubtful_doors_are_told_the_least_sure_first(tmp_path: Path, typed: PlaceEditor) -> None:
+    assert typed.now.doubtful == (), 'a person typed them'
+    cells = np.full((120, 240), 100, np.int8)
+    cells[10:110, 10:120] = cells[10:110, 124:154] = 0
+    cells[40:84, 120:124] = 0  # 2.2 m
+    cells[10:110, 158:230] = 0
+    cells[50:68, 154:158] = 0
+    write_map(tmp_path / 'map.yaml', cells, 0.05, (0.0, 0.0, 0.0))
+    (tmp_path / 'wide.yaml').write_text(
+        format_place(
+            {
+                'map_file': 'map.yaml',
+                'map': {'A': ['D1'], 'B': ['D1', 'D2'], 'C': ['D2']},
+                'room_positions': {'A': [2.0, 3.0], 'B': [6.9, 3.0], 'C': [10.0, 3.0]},
+                'robot_room': 'A',
+                'recharge_rooms': ['A'],
+                'station': [2.0, 3.0, 0.0],
+                'doors': {'D1': [6.1, 2.9, 1.5708, 2.2], 'D2': [7.8, 3.05, 1.5708, 0.9]},
+            },
+            'Made by a test.',
+        )
+    )
+    assert PlaceEditor(tmp_path / 'wide.yaml').now.doubtful == (('door', 'D1'),)

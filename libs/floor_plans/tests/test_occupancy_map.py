@@ -249,3 +249,10 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     read = read_map(tmp_path / 'm.yaml')
     assert (read.cells == cells).all()
     assert (read.resolution, read.origin) == (0.1, (1.0, -2.0, 0.5))
+
+
+def test_a_file_that_is_no_map_is_told_by_what_it_is(tmp_path: Path) -> None:
+    archive = tmp_path / 'maps.zip'
+    archive.write_bytes(b'PK\x03\x04' + bytes(60))
+    with pytest.raises(FileError, match=r'maps.zip: a zip archive: expected a map.yaml, or a pic'):
+        read_map(archive)

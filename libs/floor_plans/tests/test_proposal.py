@@ -111,3 +111,10 @@ def test_a_gap_between_a_wall_and_furniture_is_no_door() -> None:
     found = propose(with_cupboard, RADIUS)
     assert len(found.names) == 2
     assert list(found.parameters['doors']) == ['D1']
+
+
+@pytest.mark.parametrize(('value', 'said'), [(-1, '100% unknown'), (100, '100% occupied')])
+def test_a_map_without_floor_is_told_what_it_has(value: int, said: str) -> None:
+    cells = np.full((50, 50), value, np.int8)
+    with pytest.raises(ValueError, match=f'no cell of the map is free .*{said}'):
+        propose(OccupancyMap(Path('map.yaml'), cells, 0.05, (0.0, 0.0, 0.0)), 0.22)

@@ -200,6 +200,7 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
             }
             for number, part in enumerate(now.left_out, start=1)
         },
+        'doubtful': [f'{kind} {name}' for kind, name in now.doubtful],
         'start': place.start,
         'quiet_hours': described.get('quiet_hours', ''),
         'time_zone': described.get('time_zone', ''),

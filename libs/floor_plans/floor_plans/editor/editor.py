@@ -10,9 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from floor_plans.description import described_in, map_file_beside
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 from floor_plans.floor_plan import FloorPlan
+from floor_plans.map_rooms.confidence import DOUBTFUL, door_confidence
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.patrol_rules import PatrolRules, patrol_rules
 from floor_plans.room_map import ROBOT_RADIUS, FloorPart, RoomMap, check_passable
@@ -47,6 +50,29 @@ class Moment:
     def left_out(self) -> tuple[FloorPart, ...]:
         """The parts of the floor that are no rooms, largest first."""
         return self.regions.left_out()
+
+    @cached_property
+    def doubtful(self) -> tuple[tuple[str, str], ...]:
+        """What of a map's rooms and doors is to be looked at first: kind and name, the least sure
+        first.
+
+        A room that its doors make doubtful is left out: they are looked at.
+        """
+        if self.plan.map is None:
+            return ()
+        labels, names = self.regions.numbers()
+        floor = np.where(self.regions.grid.free, np.maximum(labels, 0), 0)
+        counts = np.bincount(floor.ravel(), minlength=max(names, default=0) + 1)
+        side = self.regions.grid.resolution
+        areas = {name: float(counts[number]) * side**2 for number, name in names.items()}
+        doors = {
+            name: (self.plan.place.doors[name], door.width)
+            for name, door in self.plan.doors.items()
+            if len(self.plan.place.doors[name]) == 2
+        }
+        sure = door_confidence(areas, doors)
+        found = sorted((each, name) for name, each in sure.items() if each < DOUBTFUL)
+        return tuple(('door', name) for _, name in found)
 
 
 class PlaceEditor:

@@ -131,6 +131,17 @@ def join(draft: Draft, first: str, second: str) -> str:
     return f'{second} is a part of {first}'
 
 
+def join_at(draft: Draft, name: str) -> str:
+    """Make one room of the two that a door joins; it keeps the larger one's name."""
+    _member('door', name, draft.plan.place.doors)
+    rooms = draft.plan.place.doors[name]
+    if len(rooms) != 2:
+        raise ValueError(f'{name} joins {", ".join(rooms) or "nothing"}: expected two rooms')
+    size = {room: int(draft.regions.mask(room).sum()) for room in rooms}
+    first, second = sorted(rooms, key=lambda room: -size[room])
+    return join(draft, first, second)
+
+
 def remove_room(draft: Draft, room: str) -> str:
     """Take a room out of the place, with its doors, which lead nowhere then; its floor stays."""
     draft.plan.place.without_room(room)  # which says why it cannot go
@@ -223,6 +234,21 @@ def remove_door(draft: Draft, name: str) -> str:
         draft.table('map')[room] = [door for door in doors if door != name]
     draft.table('doors').pop(name, None)
     return f'{name} is removed'
+
+
+def wall_off(draft: Draft, name: str) -> str:
+    """Close a door by a wall; each of its rooms needs another one."""
+    door = draft.plan.doors.get(name)
+    if door is None:
+        raise ValueError(f'{name} stands nowhere: expected a door with a position')
+    remove_door(draft, name)
+    # A little longer than the opening, so that no gap remains beside it.
+    (x1, y1), (x2, y2) = door.ends
+    more = min(1.0, 0.1 / max(door.width, 0.1))
+    dx, dy = more * (x2 - x1), more * (y2 - y1)
+    wall = _next_name('W', draft.table('walls'))
+    draft.table('walls')[wall] = [*_rounded(x1 - dx, y1 - dy), *_rounded(x2 + dx, y2 + dy)]
+    return f'{name} is a wall'
 
 
 def take_part(draft: Draft, x: float, y: float) -> str:
@@ -489,8 +515,8 @@ def remove_marker(draft: Draft, name: str) -> str:
 OPERATIONS: Mapping[str, Callable[..., str]] = {
     each.__name__: each
     for each in (
-        *(cut, join, take_part, remove_room, rename, move_point),
-        *(move_door, set_door, add_door, remove_door),
+        *(cut, join, join_at, take_part, remove_room, rename, move_point),
+        *(move_door, set_door, add_door, remove_door, wall_off),
         *(move_station, add_station, remove_station),
         *(
             set_zone,

@@ -23,6 +23,7 @@ from floor_plans.imports.graphs import SUFFIXES, read_graph
 from floor_plans.imports.renewal import renewed
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import LeftOut, Proposal, propose
+from floor_plans.map_rooms.confidence import DOUBTFUL
 from floor_plans.map_rooms.halls import Hall
 from floor_plans.map_rooms.proposal import OUTSIDE
 from floor_plans.occupancy_grid import distance_to
@@ -240,8 +241,6 @@ def _written(
 
 
 _MOST_POINTS = 6
-_DOUBTFUL = 0.75
-"""A room or a door with less confidence is named as doubtful."""
 
 
 def _explained(proposal: Proposal, content: Mapping[str, Any]) -> list[str]:
@@ -250,7 +249,7 @@ def _explained(proposal: Proposal, content: Mapping[str, Any]) -> list[str]:
     doubtful = [
         f'{each["name"]} ({each["confidence"]:g})'
         for each in (*content['rooms'], *content['doors'])
-        if each['confidence'] < _DOUBTFUL
+        if each['confidence'] < DOUBTFUL
     ]
     if doubtful:
         lines.append(f'doubtful, look at these first: {", ".join(doubtful)}')

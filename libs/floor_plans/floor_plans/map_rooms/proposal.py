@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.floor_plan import Door, FloorPlan
+from floor_plans.map_rooms.confidence import door_confidence
 from floor_plans.map_rooms.halls import Hall, halls, with_aisles
-from floor_plans.map_rooms.joining import SEPARATE
 from floor_plans.map_rooms.segmentation import (
     CELL,
     SMALLEST_ROOM,
@@ -111,20 +111,20 @@ class Proposal:
     def confidence(self) -> dict[str, float]:
         """Return how sure each room and door is, from 0.5 to 1.
 
-        A door is sure if it is narrow for the smaller room behind it, as rooms are told apart
-        (`joining`); a room is as sure as the least sure of its doors for which it is the smaller.
+        Of doors `door_confidence` says it; a room is as sure as the least sure of its doors for
+        which it is the smaller.
         """
         areas, found = self.areas(), dict.fromkeys(self.names.values(), 1.0)
         sides: dict[str, list[str]] = {}
         for room, doors in self.parameters['map'].items():
             for door in doors:
                 sides.setdefault(door, []).append(room)
-        for door, (*_, width) in self.parameters.get('doors', {}).items():
+        placed = self.parameters.get('doors', {})
+        sure = door_confidence(areas, {door: (sides[door], row[3]) for door, row in placed.items()})
+        for door, each in sure.items():
             smaller = min(sides[door], key=areas.__getitem__)
-            separation = max(areas[smaller] / width**2, SEPARATE)
-            found[door] = round(1.0 - 0.5 * SEPARATE / separation, 2)
-            found[smaller] = min(found[smaller], found[door])
-        return found
+            found[smaller] = min(found[smaller], each)
+        return {**found, **sure}
 
     def halls(self, building: OccupancyMap) -> dict[str, Hall]:
         """Return the rooms that are too large to be seen from their points, by name."""
@@ -178,6 +178,12 @@ def propose(
         ValueError: The robot fits nowhere.
     """
     known = doors or {}
+    if not building.own_grid.free.any():
+        unknown = float((building.own_grid.cells < 0).mean())
+        raise ValueError(
+            f'no cell of the map is free ({unknown:.0%} unknown, {1 - unknown:.0%} occupied): '
+            'expected floor'
+        )
     found = segment(building.own_grid, [_as_line(building.to_own(each)) for each in known.values()])
     grid = found.working
     # A working cell is not exactly 0.05 m where the map's are of another size.

@@ -5,9 +5,10 @@ import {$, h, s, act, ask, names} from './dom.js';
 const may = document.documentElement.dataset.edit === '1';
 $('live-link').hidden = document.documentElement.dataset.live !== '1';
 const TOOLS = {
-  select: ['Select', 'v', 'Tap a room, a door or a zone; drag its handle to move it; drag the floor to look around.'],
+  select: ['Select', 'v', 'Tap a room, a door or a zone; drag its handle to move it; drag the floor to look around. Dashed doors are doubtful.'],
   cut: ['Cut', 'c', 'Draw a line through a room, or tap its two ends. It is carried on to the walls.'],
-  join: ['Join', 'j', 'Tap a room, then the one that becomes a part of it.'],
+  join: ['Join', 'j', 'Tap a door: the rooms on both sides become one. Or tap a room, then the one that becomes a part of it.'],
+  wall: ['Wall', 'x', 'Tap a door: a wall closes it.'],
   door: ['Door', 'd', 'Tap where two rooms meet.'],
   keep_out: ['Keep out', 'k', 'Drag a rectangle, or tap the corners and press Done.'],
   slow: ['Slow', 'w', 'Drag a rectangle, or tap the corners and press Done. Its speed is 0.3 m/s at first.'],
@@ -112,7 +113,7 @@ function draw() {
   layers.zones.replaceChildren(...Object.entries(place.zones).map(([name, zone]) => s('path', {
     class: `zone ${zone.kind}${is('zone', name) ? ' on' : ''}`, d: path(zone.corners), 'stroke-width': 2 * p, 'data-kind': 'zone', 'data-name': name})));
   layers.doors.replaceChildren(...Object.entries(place.doors).map(([name, {line: [x1, y1, x2, y2]}]) => s('line', {
-    class: `door${is('door', name) ? ' on' : ''}`, x1, y1: -y1, x2, y2: -y2, 'stroke-width': 4 * p, 'data-kind': 'door', 'data-name': name})));
+    class: `door${is('door', name) ? ' on' : ''}${place.doubtful.includes(`door ${name}`) ? ' doubtful' : ''}`, x1, y1: -y1, x2, y2: -y2, 'stroke-width': 4 * p, 'data-kind': 'door', 'data-name': name})));
   const grips = [];
   const words = [];
   for (const [name, {at}] of Object.entries(place.doors)) {
@@ -176,6 +177,7 @@ const FIELDS = {
     return [
       ['name', `Name (joins ${joins.join(' and ')})`, name, (value) => ['rename', {kind: 'door', name, new: value}]],
       ...['x, m', 'y, m', 'direction, rad', 'width, m'].map((text, index) => [`at${index}`, text, at[index], set(index)]),
+      ...(joins.length === 2 ? [['join_at', `Join ${joins.join(' and ')}`, null, () => ['join_at', {name}]], ['wall_off', 'Make it a wall', null, () => ['wall_off', {name}]]] : []),
       ['remove', 'Remove the door', null, () => ['remove_door', {name}]],
     ];
   },
@@ -286,9 +288,22 @@ function panel() {
   else form.append(h('p', {class: 'note'}, 'Choose something on the floor or in the list.'));
   $('chosen').replaceChildren(form);
   $('whole-place').replaceChildren(h('h3', {}, 'The whole place'), ...WHOLE().map((each) => field(each)));
+  $('next-doubtful').hidden = !place.doubtful.length;
+  $('next-doubtful').textContent = `Next of ${place.doubtful.length} doubtful (n)`;
   const listed = [['room', place.rooms], ['door', place.doors], ['zone', place.zones], ['station', place.stations], ['marker', place.markers], ['left_out', place.left_out]];
   $('list').replaceChildren(h('option', {value: ''}, '–'), ...listed.flatMap(([kind, entries]) => names(entries).map((name) => h('option', {value: `${kind} ${name}`}, `${kind.replace('_', ' ')} ${name}`))));
   $('list').value = chosen ? `${chosen.kind} ${chosen.name}` : '';
+}
+
+// What is doubtful is shown first, the least sure of it at the beginning; it goes round.
+function nextDoubtful() {
+  const now = place.doubtful.indexOf(chosen ? `${chosen.kind} ${chosen.name}` : '');
+  const next = place.doubtful[(now + 1) % place.doubtful.length];
+  if (!next) return;
+  const [kind, name] = next.split(' ');
+  const [x, y] = kind === 'door' ? place.doors[name].at : place.rooms[name].point;
+  view = {...view, x, y, span: Math.min(view.span, 12)};
+  choose({kind, name});
 }
 
 function choose(what) {
@@ -341,6 +356,10 @@ async function tap(point, target) {
     points.push(point);
     if (points.length === 2) await finish();
     drawDraft();
+  } else if (['join', 'wall'].includes(tool) && target?.dataset.kind === 'door' && !first) {
+    await edit(tool === 'join' ? 'join_at' : 'wall_off', {name: target.dataset.name});
+  } else if (tool === 'wall') {
+    $('hint').textContent = TOOLS.wall[2];
   } else if (tool === 'join') {
     const room = target?.dataset.kind === 'room' ? target.dataset.name : await roomAt(point);
     if (!room) return;
@@ -470,12 +489,13 @@ svg.addEventListener('keydown', (event) => {
     view.x += ARROWS[event.key][0] * step;
     view.y += ARROWS[event.key][1] * step;
     aim();
-  } else if (event.key === '+' || event.key === '=') zoom(1 / 1.3);
+  } else if (event.key === 'n') nextDoubtful();
+  else if (event.key === '+' || event.key === '=') zoom(1 / 1.3);
   else if (event.key === '-') zoom(1.3);
   else if (event.key === '0') { whole(); draw(); }
   else if (event.key === 'Enter' || event.key === ' ') {
     const near = nearest();
-    tap([view.x, view.y], tool === 'select' || tool === 'join' ? near : null);
+    tap([view.x, view.y], ['select', 'join', 'wall'].includes(tool) ? near : null);
   } else if (event.key === 'Escape') take_up('select');
   else {
     const found = Object.entries(TOOLS).find(([, [, key]]) => key === event.key);
@@ -513,6 +533,7 @@ $('tools').append(
 $('closer').addEventListener('click', () => zoom(1 / 1.3));
 $('farther').addEventListener('click', () => zoom(1.3));
 $('whole').addEventListener('click', () => { whole(); draw(); });
+$('next-doubtful').addEventListener('click', nextDoubtful);
 $('undo').addEventListener('click', () => send('undo_edit'));
 $('redo').addEventListener('click', () => send('redo_edit'));
 $('save').addEventListener('click', () => send('save_place'));

@@ -1,0 +1,30 @@
+"""How sure it is that a door of a map parts two rooms, and does not only lie in one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from floor_plans.map_rooms.joining import SEPARATE
+
+DOUBTFUL = 0.75
+"""What is less sure is to be looked at by a person first."""
+
+
+def door_confidence(
+    areas: Mapping[str, float], doors: Mapping[str, tuple[Sequence[str], float]]
+) -> dict[str, float]:
+    """Return how sure each door is, from 0.5 to 1.
+
+    A door is sure if it is narrow for the smaller room behind it, as rooms are told apart
+    (`joining`).
+
+    Args:
+        areas: Of the rooms, square metres.
+        doors: The rooms that each door joins, and its width, metres.
+    """
+    found = {}
+    for door, (rooms, width) in doors.items():
+        smaller = min(areas.get(room, 0.0) for room in rooms)
+        separation = max(smaller / max(width, 0.05) ** 2, SEPARATE)
+        found[door] = round(1.0 - 0.5 * SEPARATE / separation, 2)
+    return found
