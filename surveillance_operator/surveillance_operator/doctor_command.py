@@ -19,6 +19,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from indoor_watch import detectors
 from lidar_navigation import Footprint
 from lidar_navigation.geometry import Mount
 from strict_files.files import replace_text
@@ -135,6 +136,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         *unplaced(profile, seen, options.namespace),
     ):
         print(line)
+    if seen.publishers.get(named(profile.topics.image, options.namespace)):
+        with suppress(ValueError):
+            print(detectors.described())
     found = list(doubts(profile, seen, options.namespace))
     if moved is not None:
         found += motion_doubts(moved, profile, (mount or Mount(),))
@@ -200,7 +204,8 @@ def _of_nav2(node: Node, namespace: str, spin: Callable[[float], None]) -> dict[
 
 def _amend(path: Path, found: Sequence[Doubt], *, writes: bool) -> None:
     """Write the lines into a profile of the user's, or offer it."""
-    lines = [each for each in found if each.key]
+    # Of two that say the same key the first: what tf_static says is exact, what scans say is not.
+    lines = list({each.key: each for each in reversed(found) if each.key}.values())
     if not lines:
         return
     if not writes:
