@@ -25,7 +25,7 @@ from typing import Any
 
 from rclpy.action import ActionClient, get_action_server_names_and_types_by_node
 from rclpy.node import Node
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.subscription import Subscription
 
 from benchmarks.fuzz_nodes import ARRAY_CODES, STRANGE_STRINGS
@@ -184,6 +184,7 @@ class Heard:
         kind: The class of what it is told.
         call: Tells it a message; the executor's thread may call it.
         honest: Messages that were heard.
+        on_honest: Called when one was.
     """
 
     node: str
@@ -191,6 +192,7 @@ class Heard:
     kind: Any
     call: Callable[[Any], Any]
     honest: list[Any] = field(default_factory=list)
+    on_honest: Callable[[], object] = lambda: None
 
     @property
     def budget(self) -> float:
@@ -231,12 +233,11 @@ def _topic(node: Node, subscription: Subscription) -> Heard:
         if len(heard.honest) < 3:
             message = given[0]
             if subscription.raw:
-                from rclpy.serialization import deserialize_message
-
                 message = deserialize_message(message, subscription.msg_type)
             heard.honest.append(message)
             if len(given) > 1:
                 info.update(given[1])
+            heard.on_honest()
         return callback(*given)
 
     # rclpy looks at how many arguments a callback takes when it is set: not again.
