@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool
 from benchmarks.callback_budget import Draws, Prober, fields_of, heard_by
 from benchmarks.whole_stack import ROOT, Stack
 from state_machines.ros import ServiceCaller
-from surveillance_interfaces.msg import OntologyMap
+from surveillance_interfaces.msg import OntologyMap, StopRequest
 from surveillance_runtime.node import PatrolNode
 
 PATIENCE = 30.0
@@ -65,16 +65,16 @@ def test_a_new_handler_is_found(graph: Any) -> None:
 def test_a_callback_that_costs_too_much_is_told(graph: Any) -> None:
     node = graph.add(PatrolNode, name='slow')
 
-    def work(message: OntologyMap) -> None:
-        sum(range(3_000_000 if message.robot_room else 1))
+    def work(message: StopRequest) -> None:
+        sum(range(5_000_000 if message.owner else 1))
 
-    node.create_subscription(OntologyMap, 'places', work, 10)
-    slow = next(each for each in heard_by(node) if each.name == '/places')
-    cost = Prober(graph._spinner.executor, Draws(random.Random(1), 10)).probe(
-        slow, 3, [('robot_room',)]
-    )
+    node.create_subscription(StopRequest, 'slow', work, 10)
+    slow = next(each for each in heard_by(node) if each.name == '/slow')
+    prober = Prober(graph._spinner.executor, Draws(random.Random(1), 10))
+    assert not prober.probe(slow, 3, [('reason',)]).broken
+    cost = prober.probe(slow, 3, [('owner',)])
     assert cost.broken
-    assert cost.path == 'robot_room'
+    assert cost.path == 'owner'
 
 
 def test_every_field_is_drawn_and_kept_in_its_type() -> None:

@@ -147,6 +147,8 @@ def test_an_alarm_is_acknowledged_with_a_remark_and_shelved(desk: Desk) -> None:
     viewer.js('document.querySelector("[data-note]").value = "I go there"')
     viewer.click('.answers [data-verb=acknowledge]')
     viewer.until(lambda: desk.done)
+    # The answer empties it.
+    viewer.until(lambda: not viewer.js('return document.querySelector("[data-note]").value'))
     viewer.click('.answers [data-verb=shelve]')
     viewer.until(lambda: len(desk.done) == 2)
     viewer.click('#bar [data-verb=acknowledge]')

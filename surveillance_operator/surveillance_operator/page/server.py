@@ -59,10 +59,12 @@ from surveillance_operator.page.access import (
 from surveillance_operator.page.api import description
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.connections import (
+    HEADER_TIME,
     SEND_BUFFER,
     BoundedConnection,
     most_connections,
 )
+from surveillance_operator.page.doorman import Doorman
 from surveillance_operator.page.gate import Gate
 
 STATIC = Path(__file__).with_name('static')
@@ -74,6 +76,8 @@ HEADERS = {
     'X-Content-Type-Options': 'nosniff',
     'Referrer-Policy': 'no-referrer',
     'Cache-Control': 'no-store',
+    # Each request comes by a connection of its own: which loop serves it is seen by its beginning.
+    'Connection': 'close',
 }
 
 DOCUMENT_POLICY = (
@@ -194,19 +198,10 @@ class Page:
         ]
         app = _Guard(Starlette(routes=routes), self._gate.refusal, report)
         _report_for_uvicorn(report)
-        bounds = {'most': most_connections(), 'crowded': staticmethod(crowded)}
-        connection = type('Connection', (BoundedConnection,), bounds)
-        config = uvicorn.Config(
-            app,
-            http=connection,
-            ws='none',
-            log_config=None,
-            access_log=False,
-            lifespan='off',
-            timeout_graceful_shutdown=1,
-            server_header=False,
-        )
-        self._server = uvicorn.Server(config)
+        most = most_connections()
+        # What cannot wait has a loop of its own: a thousand viewers do not delay it.
+        self._loops = {urgent: _Loop(app, most, crowded) for urgent in (False, True)}
+        self._door = Doorman(self._socket, _is_urgent, self._lead, most // 2, HEADER_TIME, crowded)
         self._thread: threading.Thread | None = None
         self._stop_threads = ThreadPoolExecutor(8, 'stop')
 
@@ -232,13 +227,21 @@ class Page:
 
     def run(self) -> None:
         """Serve until `stop`, or a signal on the main thread."""
-        self._server.run(sockets=[self._socket])
+        urgent = threading.Thread(target=self._loops[True].run, name='page stop', daemon=True)
+        urgent.start()
+        self._door.start()
+        self._loops[False].run()
+
+    def _lead(self, peer: socket.socket, urgent: bool) -> None:
+        self._loops[urgent].take(peer)
 
     def stop(self) -> None:
         """End the streams and the server."""
         self._broadcaster.close()
         self._stop_threads.shutdown(wait=False)
-        self._server.should_exit = True
+        self._door.stop()
+        for each in self._loops.values():
+            each.server.should_exit = True
         if self._thread is not None:
             self._thread.join(3.0)
 
@@ -456,6 +459,72 @@ async def _answered(
     except (ValueError, TypeError, CallError) as error:
         return JSONResponse({'ok': False, 'text': str(error)}, 422)
     return JSONResponse({'ok': True, 'text': result} if isinstance(result, str) else result)
+
+
+def _is_urgent(begun: bytes) -> bool:
+    """Tell by the first bytes of a request whether it stops a robot."""
+    return begun.startswith(tuple(f'POST /act/{each}'.encode() for each in STOPPING))
+
+
+class _Loop:
+    """An event loop that serves connections which somebody else accepts.
+
+    Args:
+        app: What is served.
+        most: How many connections there may be.
+        crowded: See `Page`.
+    """
+
+    def __init__(self, app: Any, most: int, crowded: Callable[[bool], object]) -> None:
+        bounds = {'most': most, 'crowded': staticmethod(crowded)}
+        self._connection: Any = type('Connection', (BoundedConnection,), bounds)
+        self._config = uvicorn.Config(
+            app,
+            http=self._connection,
+            ws='none',
+            log_config=None,
+            access_log=False,
+            lifespan='off',
+            timeout_graceful_shutdown=1,
+            server_header=False,
+        )
+        self.server = uvicorn.Server(self._config)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._runs = threading.Event()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def run(self) -> None:
+        """Serve until the server is told to exit."""
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        if not self._config.loaded:
+            self._config.load()
+        self._runs.set()
+        await self.server.serve(sockets=[])
+
+    def take(self, peer: socket.socket) -> None:
+        """Serve a connection; from any thread."""
+        self._runs.wait()
+        assert self._loop is not None
+        try:
+            self._loop.call_soon_threadsafe(self._begin, peer)
+        except RuntimeError:  # the loop has ended
+            peer.close()
+
+    def _begin(self, peer: socket.socket) -> None:
+        task = asyncio.ensure_future(self._connect(peer))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _connect(self, peer: socket.socket) -> None:
+        loop, kind = asyncio.get_running_loop(), self._connection
+        given = {'config': self._config, 'server_state': self.server.server_state, 'app_state': {}}
+        try:
+            await loop.connect_accepted_socket(partial(kind, **given), peer)
+        except OSError:
+            peer.close()
 
 
 class _OneLine(logging.Handler):
