@@ -15,7 +15,8 @@ from indoor_watch.floor import FloorView
 from indoor_watch.hung_markers import CameraView
 from indoor_watch.motion import WalkFinder
 from indoor_watch.observations import Kind, Observation
-from indoor_watch.person_places import place_of
+from indoor_watch.person_places import is_passed, place_of
+from indoor_watch.person_tracks import PersonTracks, Spot
 from indoor_watch.persons import Person, Picture
 from indoor_watch.visit import CameraShot, Coverage, LidarSweep, Pictured, Visit
 
@@ -33,6 +34,8 @@ LOOKED_SECONDS = 5.0
 FOUND = 0.88
 """Share of the persons in single photographs that are found (docs/watching.md): so sure are
 pictures of a whole floor that nobody is there."""
+DOUBTED = 0.3
+"""Confidence at most of whom the lidar sees through: below what a rule asks for."""
 UNSURE = 0.5
 """Confidence of the lidar alone that nobody is there, at most: one who stands still is a thing."""
 
@@ -50,10 +53,12 @@ class PersonMonitor:
     ) -> None:
         self._find = find
         self._walks = WalkFinder(list(doors))
+        self._tracks = PersonTracks()
 
     def begin(self) -> None:
         """Take that a visit begins."""
         self._walks.clear()
+        self._tracks.begin()
 
     def take(self, sweep: LidarSweep, visit: Visit, normal: FloorView | None) -> list[Pictured]:
         """Return who walks; before the sweep is taken into the visit's floor.
@@ -88,12 +93,25 @@ class PersonMonitor:
         if is_lit:
             # Who stands in a dark room beside a lit doorway is not found.
             _note_shown(picture, camera, visit, grid)
-        if not found:
+        finds: list[tuple[float, Spot | None]] = []
+        met = visit.things_met() if found and camera is not None else None
+        ends = None if visit.sweep is None else visit.sweep.ends
+        for each in found:
+            where, sure = None, each.confidence
+            if camera is not None and met is not None:
+                where = place_of(each, camera, met)
+                if ends is not None and where is None:
+                    passed = is_passed(each, camera, ends, picture.shape[0])
+                    sure = min(sure, DOUBTED) if passed else sure
+            finds.append((sure, where))
+        tracks = self._tracks.take(finds, shot.stamp)
+        if not tracks:
             return []
-        surest = found[0]
-        where = None if camera is None else place_of(surest, camera, visit.things_met())
-        place = visit.place if where is None else visit.place_of(where)
-        seen = Observation(Kind.PERSON, 'seen', place, '', where, surest.confidence, shot.stamp)
+        surest = tracks[0]
+        place = visit.place if surest.position is None else visit.place_of(surest.position)
+        seen = Observation(
+            Kind.PERSON, 'seen', place, '', surest.position, surest.confidence, shot.stamp
+        )
         return _seen_by('camera', seen, visit, _framed(picture, found))
 
     def leave(self, visit: Visit, coverage: Coverage) -> list[Pictured]:

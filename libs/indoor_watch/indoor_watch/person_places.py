@@ -23,6 +23,9 @@ LEAST_HEIGHT, MOST_HEIGHT = 0.4, 2.4
 """What a picture shows of a person is so tall, metres; somebody may sit, or reach out of it."""
 HIGHEST_FOOT = 1.3
 """And begins at most so high above the floor, metres: a table may hide the rest."""
+FEWEST_BEAMS, BEYOND = 3, (0.5, 1.3)
+"""So many beams have to go so far beyond a person's feet: metres, and a factor of their distance,
+as a degree of the camera's pitch is a third of it at 4 m and 0.9 m of height."""
 TOGETHER, FEWEST = 0.4, 2
 """Ends so near to each other, metres, are of one thing, which has so many."""
 
@@ -55,6 +58,36 @@ def place_of(person: Person, camera: CameraView, met: Array) -> tuple[float, flo
             spot = thing.mean(axis=0)
             found.append((distance, float(spot[0]), float(spot[1])))
     return min(found)[1:] if found else None
+
+
+def is_passed(person: Person, camera: CameraView, ends: Array, rows: int) -> bool:
+    """Tell whether the lidar saw through where a person would stand: then nobody does.
+
+    Feet that a picture shows stand on the floor, where a lidar near the floor meets legs. Beams
+    that go on far beyond them say that it is a picture on a wall, a reflection, or no person. What
+    is nearer may hide legs, and says nothing.
+
+    Args:
+        person: What was found in the picture.
+        camera: From where it was taken.
+        ends: Where the beams of a sweep at that time ended, (n, 2), map frame.
+        rows: Of the picture: of who is cut off at its lower edge the feet are not known.
+    """
+    left, top, width, height = person.box
+    if top + height >= rows - 2 or not len(ends):
+        return False
+    pixels = [[left + width / 2, top + height, 1.0], [left, top, 1.0], [left + width, top, 1.0]]
+    lines = np.array(pixels) @ np.linalg.inv(camera.matrix).T @ camera.pose[:3, :3].T
+    if lines[0, 2] >= -1e-6:
+        return False  # the feet are above the horizon
+    distance = float(camera.at[2] / -lines[0, 2] * np.hypot(*lines[0, :2]))
+    bearings = np.arctan2(lines[:, 1], lines[:, 0])
+    half = abs(math.remainder(float(bearings[1] - bearings[2]), math.tau)) / 4.0
+    offsets = ends - camera.at[:2]
+    turned = np.arctan2(offsets[:, 1], offsets[:, 0]) - bearings[0]
+    away = np.abs((turned + math.pi) % math.tau - math.pi)
+    through = np.hypot(*offsets[away <= half].T)
+    return bool(len(through) >= FEWEST_BEAMS and through.min() > BEYOND[0] + BEYOND[1] * distance)
 
 
 def _things(points: Array) -> list[Array]:
