@@ -427,7 +427,8 @@ world.save()
         "print(json.dumps([i.name for i in world['http://example.org/other#Thingy'].instances()]))"
     )
     assert found == ['one']
-    assert served.notes == []
+    (note,) = served.notes
+    assert 'wrote in the ontology <http://example.org/other#> is kept and left alone' in note
 
 
 def test_a_world_that_somebody_made_is_a_reference(tmp_path: Path) -> None:

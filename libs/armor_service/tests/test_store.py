@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import random
@@ -14,6 +15,7 @@ import threading
 from contextlib import closing
 from pathlib import Path
 
+import owlready2
 import pytest
 
 from armor_service.access import Settings
@@ -35,6 +37,7 @@ from .seven_rooms import FIXTURES, IRI, ONTOLOGY, Ask, asker, names
 
 OLD = 'http://example.org/old'
 LOAD = ('LOAD FILE', ONTOLOGY, IRI)
+LOAD_ALL = (ONTOLOGY, IRI, 'false', 'PELLET', 'false')
 
 
 class Server:
@@ -321,6 +324,91 @@ def test_a_world_of_another_version_is_refused_with_one_line(server: Server) -> 
         db.commit()
     with pytest.raises(StoreError, match='of version 13 of owlready2, expected 12'):
         server.start()
+
+
+def test_what_is_no_reference_is_left_alone_and_put_aside_by_a_load(tmp_path: Path) -> None:
+    folder = tmp_path / 'store' / 'worlds'
+    folder.mkdir(parents=True)
+    with closing(sqlite3.connect(folder / 'other.sqlite3')) as db:
+        db.execute('CREATE TABLE notes (text)')
+        db.execute("INSERT INTO notes VALUES ('mine')")
+        db.commit()
+    world = owlready2.World(filename=str(folder / 'map.sqlite3'))
+    for name in 'ab':
+        world.get_ontology(f'http://example.org/{name}#')
+    world.save()
+    world.close()
+    server = Server(tmp_path / 'store')
+    two, other = sorted(server.notes)
+    assert 'map.sqlite3: is left alone: expected one ontology, found' in two
+    assert other.endswith('other.sqlite3: is left alone: is no World of owlready2')
+    server.notes.clear()
+    for name in ('map', 'other'):
+        request = DirectiveRequest('c', name, 'LOAD', 'FILE', '', LOAD_ALL)
+        assert server.service.execute(request).success
+    assert len([note for note in server.notes if 'put aside in replaced-' in note]) == 2
+    server.restart()
+    assert server.ask('QUERY IND CLASS', 'ROBOT').success
+    (aside,) = folder.glob('replaced-*-other.sqlite3')
+    with closing(sqlite3.connect(aside)) as db:
+        assert db.execute('SELECT text FROM notes').fetchall() == [('mine',)]
+    (aside,) = folder.glob('replaced-*-map.sqlite3')
+    world = owlready2.World(filename=str(aside))
+    assert {'http://example.org/a#', 'http://example.org/b#'} <= {*world.ontologies}
+    world.close()
+
+
+def test_tables_of_others_stay_in_the_file(server: Server) -> None:
+    with closing(sqlite3.connect(server.path)) as db:
+        db.execute('CREATE TABLE notes (text)')
+        db.execute("INSERT INTO notes VALUES ('mine')")
+        db.commit()
+    server.ask('ADD IND CLASS', 'D9', 'DOOR')
+    server.restart()
+    assert '<' + IRI + '#D9>' in server.ask('QUERY IND CLASS', 'DOOR').queried_objects
+    with closing(sqlite3.connect(server.path)) as db:
+        assert db.execute('SELECT text FROM notes').fetchall() == [('mine',)]
+    assert server.notes == []
+
+
+def test_a_folder_that_may_not_be_written_is_told_and_keeps_nobody_from_working(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, 'Read-only file system')
+
+    with monkeypatch.context() as patched:
+        patched.setattr(WorldFile, '_opened', refuse)
+        patched.setattr(Spill, 'append', refuse)
+        patched.setattr(Spill, 'clear', refuse)
+        patched.setattr('armor_service.store.world_file.os.access', lambda *_: False)
+        request = DirectiveRequest('c', 'map', 'LOAD', 'FILE', '', LOAD_ALL)
+        assert server.service.execute(request).success
+        server.ask('ADD IND CLASS', 'D9', 'DOOR')
+        (note,) = [note for note in server.notes if 'Read-only' in note]
+        assert note.endswith('until it can be written, changes are lost at a restart')
+    server.written.wait(60.0)
+    server.restart()
+    assert '<' + IRI + '#D9>' in server.ask('QUERY IND CLASS', 'DOOR').queried_objects
+
+
+def test_an_import_that_is_not_there_is_told_and_costs_no_cases(
+    tmp_path: Path, server: Server
+) -> None:
+    path = tmp_path / 'files' / 'importing.omn'
+    path.write_text('Ontology: <http://x/a> Import: <http://x/gone> Individual: <http://x/a#i>')
+    request = DirectiveRequest(
+        'c', 'a', 'LOAD', 'FILE', '', (str(path), 'http://x/a', *LOAD_ALL[2:])
+    )
+    said = server.service.execute(request)
+    assert said.success
+    assert said.error_description.startswith('1 statements not supported')
+    assert 'owl:imports <http://x/gone> is not followed: no such file' in said.error_description
+    for _ in range(2):
+        query = DirectiveRequest('c', 'a', 'QUERY', 'UNSUPPORTED', '', ())
+        found = server.service.execute(query).queried_objects
+        assert found == ['owl:imports <http://x/gone> is not followed']
+        server.restart()
 
 
 def test_a_copy_is_whole_while_the_service_runs(server: Server, tmp_path: Path) -> None:

@@ -433,7 +433,8 @@ def _read_document(
         notes.append('the ontology is inconsistent')
     rules = [axiom for axiom in document.axioms if isinstance(axiom, Rule)]
     notes += endless_rules(rules, rules)
-    unsupported = [*document.unsupported, *kb.unsupported]
+    said = '; '.join(document.unsupported)
+    unsupported = [*document.unsupported, *(one for one in kb.unsupported if one not in said)]
     if unsupported:
         more = f' and {len(unsupported) - MAX_NAMED} more' if len(unsupported) > MAX_NAMED else ''
         named = '; '.join(unsupported[:MAX_NAMED])

@@ -23,7 +23,7 @@ from armor_service.protocol import StoreError
 from armor_service.reference import Reference
 from armor_service.store.journal_conversion import put_journal_aside, read_journal
 from armor_service.store.reasoning_note import ReasoningNote
-from armor_service.store.world_file import ENDING, WorldFile
+from armor_service.store.world_file import DAMAGED, ENDING, REPLACED, WorldFile
 
 LOOK_PERIOD = 0.05
 """Seconds between two looks at the files."""
@@ -94,7 +94,7 @@ class Store:
                 f'now; the journal is put aside in {aside}'
             )
         for path in sorted(self._folder.glob(f'*{ENDING}')):
-            if path.name.startswith('damaged-') or any(
+            if path.name.startswith((DAMAGED, REPLACED)) or any(
                 path == file.path for file in self._files.values()
             ):
                 continue
@@ -244,6 +244,6 @@ def file_stem(name: str) -> str:
     """Return a reference's name as that of a file; a long one by what it is hashed to."""
     # Not with %: owlready2 opens a file as a URI.
     stem = quote(name, safe=' -_()+,@').replace('%', '=')
-    if len(stem) > 200 or stem.startswith(('.', ' ')):
+    if len(stem) > 200 or stem.startswith(('.', ' ', DAMAGED, REPLACED)):
         return hashlib.sha256(name.encode()).hexdigest()[:32]
     return stem

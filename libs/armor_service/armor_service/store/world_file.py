@@ -19,6 +19,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
+from itertools import count
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -43,6 +44,8 @@ INFERRED = 'http://inferrences/'
 ANONYMOUS = 'http://anonymous/'
 """owlready2's ontology for what was made without naming one."""
 ENDING = '.sqlite3'
+DAMAGED, REPLACED = 'damaged-', 'replaced-'
+"""How the names of files begin that were put aside."""
 VERSION = 12
 """owlready2's version of the tables of a World."""
 BUSY = 0.05
@@ -152,6 +155,7 @@ class WorldFile:
         self._failure = ''
         self._failed_at = self._failed_since = 0.0
         self._told_failure = False
+        self._others: set[int] = set()
         self._commits = self._commits_synced = 0
         self._sync_lock = threading.Lock()
 
@@ -276,11 +280,21 @@ class WorldFile:
             if 'locked' in str(error):
                 holder = lock_holder(self.path) or 'another program'
                 raise StoreError(f'{self.path}: {holder} has it for itself') from None
+            if 'no such table' in str(error) and not self._is_world():
+                notes.append(f'{self.path}: is left alone: is no World of owlready2')
+                self.close_file()
+                return None
             if 'malformed' not in str(error) and 'no such table' not in str(error):
                 raise StoreError(f'{self.path}: {error}') from None
             return self._salvaged(error, notes)
         except sqlite3.DatabaseError as error:
             return self._salvaged(error, notes)
+
+    def _is_world(self) -> bool:
+        """Tell whether a database has one of the tables of a World."""
+        query = "SELECT count(*) FROM sqlite_master WHERE name IN ('store', 'objs', 'resources')"
+        with closing(sqlite3.connect(_read_only(self.path), uri=True)) as db:
+            return bool(db.execute(query).fetchone()[0])
 
     def _recovered(self, notes: list[str]) -> Reference | None:
         db = self._opened()
@@ -374,12 +388,7 @@ class WorldFile:
     def _salvaged(self, error: Exception, notes: list[str]) -> Reference | None:
         """Put a damaged file aside, and go on with what can be read of it."""
         self.close_file()
-        aside = self.path.with_name(f'damaged-{time.strftime("%Y%m%d-%H%M%S")}-{self.path.name}')
-        for ending in ('', '-wal', '-shm'):
-            with suppress(FileNotFoundError):
-                self.path.with_name(self.path.name + ending).rename(
-                    aside.with_name(aside.name + ending)
-                )
+        aside = put_aside(self.path, DAMAGED)
         self._make()
         quads, lost = 0, 1
         with closing(sqlite3.connect(self.path, isolation_level=None)) as db:
@@ -442,9 +451,13 @@ class WorldFile:
     def create(self) -> None:
         """Write a new reference."""
         self._whole = True
-        for ending in ('', '-wal', '-shm'):
-            self.path.with_name(self.path.name + ending).unlink(missing_ok=True)
-        self._spill.clear()
+        if self.path.exists():
+            # No reference's: somebody put it there, or it was left alone.
+            with suppress(OSError):
+                aside = put_aside(self.path, REPLACED)
+                self._warn(f'{self.path}: what was there is put aside in {aside.name}')
+        with suppress(OSError):
+            self._spill.clear()
         self.commit()
 
     def commit(self) -> None:
@@ -615,13 +628,12 @@ class WorldFile:
         ):
             # Damaged while it is in use: all that is known is written into another one.
             self.close_file()
-            aside = self.path.with_name(
-                f'damaged-{time.strftime("%Y%m%d-%H%M%S")}-{self.path.name}'
-            )
+            aside = None
             with suppress(OSError):
-                self.path.rename(aside)
+                aside = put_aside(self.path, DAMAGED)
             self._whole = True
-            self._warn(f'{self.path}: {error}; put aside in {aside.name} and written anew')
+            where = f'put aside in {aside.name} and ' if aside else ''
+            self._warn(f'{self.path}: {error}; {where}written anew')
         if not self._failure:
             self._failed_since = now
         self._failure, self._failed_at = str(error), now
@@ -663,7 +675,10 @@ class WorldFile:
                 f'{self._failure}: until it can be written, changes are lost at a restart'
             )
         elif 'locked' not in self._failure:
-            self._tell_failure(f'{self._failure}: changes are kept in {self._spill_name}')
+            where = f'changes are kept in {self._spill_name}'
+            if not os.access(self.path.parent, os.W_OK):
+                where = 'until it can be written, changes are lost at a restart'
+            self._tell_failure(f'{self._failure}: {where}')
 
     @property
     def _spill_name(self) -> str:
@@ -720,6 +735,7 @@ class WorldFile:
         net: dict[Quad, int] = {}
         names: list[tuple[int, str]] = []
         forgotten: list[int] = []
+        others: set[int] = set()
         for event, c, s, p, o, d in rows:
             if event == _RENAMED:
                 self._names.forget(s)
@@ -732,6 +748,9 @@ class WorldFile:
                 _count(net, (s, p, o) if d is None else (s, p, o, d), 1 if event == _COME else -1)
             elif c == inferred.context:
                 self._derived_known = False
+            else:
+                others.add(c)
+        self._tell_others(db, others)
         changes = self._renamed(ontology, names)
         come = [quad for quad, step in net.items() if step > 0]
         gone = [quad for quad, step in net.items() if step < 0]
@@ -750,6 +769,17 @@ class WorldFile:
         if not changes and not replacing:
             return None
         return self._merge(ontology, Told(FILE, time.time(), tuple(changes)), replacing)
+
+    def _tell_others(self, db: sqlite3.Connection, contexts: set[int]) -> None:
+        """Say once of each other ontology of the file that it is not the reference's."""
+        for context in sorted(contexts - self._others):
+            self._others.add(context)
+            row = db.execute('SELECT iri FROM ontologies WHERE c=?', (context,)).fetchone()
+            if row is not None and row[0] != ANONYMOUS:
+                self._warn(
+                    f'{self.path}: what another program wrote in the ontology <{row[0]}> is kept '
+                    f'and left alone: the reference is <{self.ref.kb.iri}>'
+                )
 
     def _replacing(self, found: AxiomsRead) -> list[SetAssertion]:
         """Take the numbers out of what was read that take the place of one of another type.
@@ -802,9 +832,7 @@ class WorldFile:
         problems: Sequence[str],
     ) -> None:
         """Undo what is no OWL, and keep it in a file."""
-        aside = self.path.with_name(
-            f'refused-{time.strftime("%Y%m%d-%H%M%S")}-{self.path.stem}.txt'
-        )
+        aside = _free_name(self.path.with_suffix('.txt'), 'refused-')
         lines = [
             f'{sign} {" ".join(ontology.text(quad))} .\n'
             for sign, quads in (('+', come), ('-', gone))
@@ -926,6 +954,21 @@ class WorldFile:
                     self._warn(f'{self.path}: {self._failure}: {lost} changes are not kept')
             self.close_file()
             self._spill.close()
+
+
+def put_aside(path: Path, word: str) -> Path:
+    """Give a World's file another name, with what SQLite keeps beside it, and return that."""
+    aside = _free_name(path, word)
+    for ending in ('', '-wal', '-shm'):
+        with suppress(FileNotFoundError):
+            path.with_name(path.name + ending).rename(aside.with_name(aside.name + ending))
+    return aside
+
+
+def _free_name(path: Path, word: str) -> Path:
+    stamp = time.strftime('%Y%m%d-%H%M%S')
+    names = (f'{word}{stamp}{f"-{n}" if n > 1 else ""}-{path.name}' for n in count(1))
+    return next(found for name in names if not (found := path.with_name(name)).exists())
 
 
 def _lost(tables: int) -> str:

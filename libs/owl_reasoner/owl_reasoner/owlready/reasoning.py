@@ -211,7 +211,14 @@ class _Session:
         self._names = {}
         mapping = read_axioms(self.world, self._contexts(), hidden, self._names)
         self._kinds = _Kinds.of(mapping.declared)
-        found = dict.fromkeys((*mapping.axioms, *self._probes()))
+        # What an ontology of the World imports is read as well; so far as it was chosen, at least.
+        there = {iri.rstrip('#/') for iri in self.world.ontologies}
+        told = (
+            axiom
+            for axiom in mapping.axioms
+            if not isinstance(axiom, ax.Import) or axiom.iri.rstrip('#/') not in there
+        )
+        found = dict.fromkeys((*told, *self._probes()))
         if self._kb is None:
             self._kb = KnowledgeBase('', found)
             self._kb.subscribe(self._note)

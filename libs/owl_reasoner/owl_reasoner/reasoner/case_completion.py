@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from owl_reasoner.owl.assertions import is_assertion
 from owl_reasoner.owl.axiom_text import axiom_text
-from owl_reasoner.owl.axioms import Axiom, ClassAssertion, Rule
+from owl_reasoner.owl.axioms import Axiom, ClassAssertion, Import, Rule
 from owl_reasoner.reasoner.consequence_based.classification import Classification
 from owl_reasoner.reasoner.engine import Engine
 from owl_reasoner.reasoner.horn_completeness import HornCompleteness, names_individual
@@ -53,6 +53,11 @@ class CaseCompletion:
         has_rules = any(isinstance(axiom, Rule) for axiom in schema)
         self._horn = HornCompleteness(engine, self._program, has_rules=has_rules)
         self._schema = schema
+        self._imports = [
+            f'owl:imports <{axiom.iri}> is not followed'
+            for axiom in schema
+            if type(axiom) is Import
+        ]
         self._native = tuple(self._program.unsupported)
         # Whether classes were compared, and whether that holds whatever is said of individuals.
         self._compared = self._stands = False
@@ -78,9 +83,10 @@ class CaseCompletion:
     @property
     def unsupported(self) -> tuple[str, ...]:
         """One sentence for each axiom that is not fully used."""
+        found: Iterable[str] = [*self._program.unsupported, *self._horn.sentences()]
         if self._left_out is not None:
-            return self._left_out
-        return tuple(dict.fromkeys([*self._program.unsupported, *self._horn.sentences()]))
+            found = self._left_out
+        return tuple(dict.fromkeys([*found, *self._imports]))
 
     def expect(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
         """Take in a change of assertions before the engine does."""

@@ -642,11 +642,9 @@ class Translation:
             self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
         elif isinstance(axiom, ax.Rule):
             self._rules.add(axiom)
-        elif isinstance(axiom, ax.Import):
-            raise UnsupportedError('imports are not followed')
         elif isinstance(axiom, ax.HasKey):
             self._key(axiom)
-        elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition)):
+        elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition, ax.Import)):
             self._properties.add(axiom)
 
     def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
