@@ -36,7 +36,8 @@ from surveillance_operator.desk.documents import DeskDocuments
 from surveillance_operator.desk.live_desk import LiveDesk
 from surveillance_operator.desk.metrics import KIND, metrics
 from surveillance_operator.desk.past_parts import PastParts
-from surveillance_operator.fleet_actions import WORDS, FleetActions
+from surveillance_operator.desk.rule_file import add_rule, rule_entry
+from surveillance_operator.fleet_actions import ALL, WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.hand_driving import HandDriving
 from surveillance_operator.images import ANNOTATED, PLAIN, jpeg_from
@@ -133,6 +134,13 @@ class MissionPage(PatrolNode):
             '',
             'File with the names and roles of those who have links of their own, and the hashes '
             'of their tokens; empty: links last as long as the node.',
+            read_only=True,
+        )
+        self._watch_file = self.parameter(
+            'watch_file',
+            '',
+            'The rules of what matters, watch.yaml, to which the page may add one with `control`; '
+            'empty: none.',
             read_only=True,
         )
         self._sightings = Sightings(self, evidence_folder)
@@ -283,7 +291,26 @@ class MissionPage(PatrolNode):
             'drive': self._drive,
             'pose': self._set_pose,
             **self._alarm_actions(),
+            **({'rule': self._add_rule} if self._watch_file else {}),
         }
+
+    def _add_rule(
+        self,
+        name: str,
+        kind: str,
+        wanted: str,
+        subject: str = 'all',
+        hours: str = '',
+        severity: str = 'alert',
+        places: Sequence[str] = (),
+    ) -> str:
+        """Add a rule to watch.yaml: the observers follow it at once."""
+        entry = rule_entry(kind, wanted, subject, hours, severity, places)
+        known = self._subscriber.state(min(self._subscriber.robots, default='')).place
+        there = tuple(known.positions), tuple(known.doors or ())
+        rule = add_rule(Path(self._watch_file), name, entry, *there)
+        said = self._actions.carry_out(ALL, lambda actions: actions.event('rules'))
+        return f'{rule}; {said}'
 
     def _drive(self, speed: float, turn: float, robot: str = '') -> str:
         """Drive a robot by hand for the next moment, m/s and rad/s; its mission is paused."""

@@ -78,13 +78,13 @@ class FindingTeller:
         if is_told and finding.number not in self._unverified:
             return
         self._unverified.discard(finding.number)
-        self._begin(finding, finding.rule, Severity.ALARM)
+        self._begin(finding, _name(finding.rule), Severity.ALARM)
 
     def warn(self, finding: Event) -> None:
         """Take that one look alone says so, and nobody could look again: nobody is called."""
         if cause_of(finding) not in self._incidents.open():
             self._unverified.add(finding.number)
-            self._begin(finding, finding.rule, Severity.WARNING)
+            self._begin(finding, _name(finding.rule), Severity.WARNING)
 
     def _begin(self, finding: Event, why: str, severity: Severity) -> None:
         self._incidents.begin(
@@ -176,6 +176,11 @@ class FindingTeller:
             if str(error) != self._problem:
                 self._problem = str(error)
                 self._complain(self._problem)
+
+
+def _name(rule: str) -> str:
+    """Return the name that a person gave a rule, or the rule in words where it has none."""
+    return rule.partition(': ')[0]
 
 
 def cause_of(finding: Event) -> Cause:

@@ -191,7 +191,8 @@ def watch_entries(folder: Path, file: Path) -> Iterator[Entry]:
         folder: Where the run writes.
         file: The rules.
     """
-    yield for_node(OBSERVER, 'watch_file', str(file.absolute()), '--watch')
+    for node in (OBSERVER, PAGE):
+        yield for_node(node, 'watch_file', str(file.absolute()), '--watch')
     yield for_node(BEHAVIOUR_NODE, 'looks', True, '--watch')
     kept = folder.resolve()
     yield for_node(OBSERVER, 'state_file', str(kept / f'{OBSERVER}.json'), 'this run')

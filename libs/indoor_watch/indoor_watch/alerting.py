@@ -71,6 +71,11 @@ class Alerting:
         # Pictures that no event has any more, and since when.
         self._replaced: deque[tuple[float, str]] = deque()
 
+    def follow(self, rules: Sequence[WatchRule]) -> None:
+        """Judge by other rules from now on; what an earlier one has made keeps that."""
+        self.rules = tuple(rules)
+        self._by_words |= {each.words(): each for each in self.rules}
+
     def take(self, noted: Iterable[Pictured], visit: Visit) -> None:
         """Take what was noticed in a visit."""
         for each in noted:

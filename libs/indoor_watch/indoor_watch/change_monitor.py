@@ -120,6 +120,10 @@ class ChangeMonitor:
         """What matters."""
         return self._alerting.rules
 
+    def follow(self, rules: Sequence[WatchRule]) -> None:
+        """Judge by other rules from now on."""
+        self._alerting.follow(rules)
+
     @property
     def movables(self) -> Movables:
         """What moves often."""

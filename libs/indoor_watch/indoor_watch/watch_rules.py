@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import IntEnum
 from pathlib import Path
@@ -84,6 +84,7 @@ class WatchRule:
             None: a person in one picture is a WARNING, as a picture may deceive; all else as level.
         accepted: After so long, seconds, what was seen is normal, unless a person says otherwise;
             inf: a person alone says so.
+        name: Of the person's choice; empty: it has none.
     """
 
     kind: Kind
@@ -97,6 +98,7 @@ class WatchRule:
     confidence: float = 0.6
     unverified: Level | None = None
     accepted: float = math.inf
+    name: str = ''
 
     @property
     def unverified_level(self) -> Level:
@@ -131,7 +133,7 @@ class WatchRule:
         return looks >= self.looks and seconds >= self.seconds
 
     def words(self) -> str:
-        """Say the rule back."""
+        """Say the rule back, its name first."""
         where = f' in {_listed(self.places)}' if self.places else ''
         when = 'always' if self.hours == ALWAYS else f'in the hours {self.hours.text}'
         subject = f' {self.subject}' if self.subject else 's'
@@ -152,7 +154,7 @@ class WatchRule:
             said += f', unverified {_article(self.unverified)} {self.unverified.name}'
         if math.isfinite(self.accepted):
             said += f', normal after {self.accepted / 86_400.0:g} days'
-        return said
+        return f'{self.name}: {said}' if self.name else said
 
 
 def read_watch_file(
@@ -168,7 +170,11 @@ def read_watch_file(
     Raises:
         FileError: One line: where, what was wrong, what was expected.
     """
-    return read_table(path, 'rules', "'door: D1'", lambda _, entry: rule_from(entry, places, doors))
+
+    def read(name: str, entry: Mapping[str, Any]) -> WatchRule:
+        return replace(rule_from(entry, places, doors), name=str(name))
+
+    return read_table(path, 'rules', "'door: D1'", read)
 
 
 def severity_of(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from functools import partial
 from typing import Any
 
 from floor_plans import Grid
@@ -54,7 +55,8 @@ class ObserverWorker:
         points: Mapping[str, Any],
     ) -> None:
         self._complain = node.get_logger().warn
-        rules: Sequence[WatchRule] = settings.rules(tuple(points), tuple(doors))
+        self._read_rules = partial(settings.rules, tuple(points), tuple(doors))
+        rules: Sequence[WatchRule] = self._read_rules()
         self._teller, self._topics = teller, topics
         self._book = EventBook(told=teller.changed)
         self._store = settings.store(self._complain)
@@ -125,6 +127,10 @@ class ObserverWorker:
         Raises:
             ValueError: What was wrong, and what was expected.
         """
+        if line.strip() == 'rules':
+            # A person has changed the file; what is looked at for them is chosen at the start.
+            self.monitor.follow(rules := self._read_rules())
+            return f'{len(rules)} rules hold now'
         answer = answered(self._book, line, self.monitor.answer, self.monitor.movables)
         self._teller.answered(line, answer)
         self._tell_events()
