@@ -5,16 +5,20 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
+import importlib.metadata
 import io
+import json
 import os
 import signal
 import sys
+import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from launcher import interrupt, package_commands, system
+from launcher import completion, interrupt, package_commands, system
 from launcher.environment import (
     CHECKOUT,
+    COMMAND,
     INSTALLED,
     PROGRAM,
     PythonEnvironment,
@@ -100,6 +104,11 @@ def _make_streams_safe() -> None:
 
 
 def _dispatch(argv: list[str]) -> int:
+    if argv in (['--version'], ['-V'], ['version']):
+        print(f'{PROGRAM} {version()}')
+        return 0
+    if argv[:1] == ['help']:
+        argv = [*argv[1:2], '--help']
     commands: dict[str, Callable[[list[str]], int]] = {
         'run': _run,
         'explore': _explore,
@@ -107,6 +116,7 @@ def _dispatch(argv: list[str]) -> int:
         'list': _list,
         'params': _params,
         'service': _service,
+        'completion': _completion,
         'setup': _setup,
         'test': _test,
         'lint': _lint,
@@ -121,6 +131,42 @@ def _dispatch(argv: list[str]) -> int:
         known = nearest(argv[0], (*commands, *package_commands.COMMANDS))
         raise ValueError(f'unknown command {argv[0]!r}: expected {known}')
     return _run(argv)
+
+
+def version(checkout: Path = CHECKOUT) -> str:
+    """Return the version of this program."""
+    if INSTALLED:
+        return importlib.metadata.version('surveillance')
+    with open(checkout / 'pyproject.toml', 'rb') as file:
+        return str(tomllib.load(file)['project']['version'])
+
+
+def _completion(argv: list[str]) -> int:
+    parser = CommandParser(
+        prog=f'{PROGRAM} completion',
+        description='Prints what a shell reads to complete commands and options: '
+        f'eval "$({" ".join(COMMAND)} completion bash)"',
+    )
+    parser.add_argument('shell', choices=completion.SHELLS)
+    shell = parser.parse_args(argv).shell
+    options = {
+        name: completion.options_in(package_commands.help_of(name))
+        for name in package_commands.COMMANDS
+    }
+    own = completion.options_in(make_parser().format_help())
+    options |= {'run': own, 'service': [*own, '--print'], '': [*own, '--version']}
+    options |= {
+        'list': ['--json'],
+        'params': ['--json', '--write'],
+        'setup': ['--wheels', '--collect'],
+    }
+    options |= dict.fromkeys(('explore', 'node', 'help'), own) | {
+        'completion': [],
+        'test': [],
+        'lint': [],
+    }
+    print(completion.script(shell, PROGRAM, options), end='')
+    return 0
 
 
 def _run(argv: list[str]) -> int:
@@ -193,7 +239,16 @@ def _node(argv: list[str]) -> int:
 
 
 def _list(argv: list[str]) -> int:
-    CommandParser(prog=f'{PROGRAM} list', description='Lists the nodes.').parse_args(argv)
+    parser = CommandParser(prog=f'{PROGRAM} list', description='Lists the nodes.')
+    parser.add_argument('--json', action='store_true', help='for programs')
+    if parser.parse_args(argv).json:
+        nodes = node_table.NODES
+        print(
+            json.dumps(
+                [{'name': e.name, 'package': e.package, 'purpose': e.purpose} for e in nodes]
+            )
+        )
+        return 0
     width = max(len(node.name) for node in node_table.NODES)
     for package in dict.fromkeys(node.package for node in node_table.NODES):
         print(package)
@@ -214,6 +269,7 @@ def _params(argv: list[str]) -> int:
     parser.add_argument(
         '--write', action='store_true', help='write the schema, reference pages and help texts'
     )
+    parser.add_argument('--json', action='store_true', help='for programs')
     options = parser.parse_args(argv)
     chosen = [node_table.find(options.name)] if options.name else list(node_table.NODES)
     _enter(['params', *argv])
@@ -227,7 +283,8 @@ def _params(argv: list[str]) -> int:
     merged = run_configuration.configuration(CONFIG, run)
     run_configuration.check_assignments(merged, chosen)
     namespace = (run.namespace or '').strip('/')
-    reference_tables.show(merged, chosen, f'/{namespace}' if namespace else '', print)
+    tell = reference_tables.show_json if options.json else reference_tables.show
+    tell(merged, chosen, f'/{namespace}' if namespace else '', print)
     return 0
 
 

@@ -356,25 +356,40 @@ def write(checkout: Path) -> list[Path]:
 Printer = Callable[[str], None]
 
 
-def show(
-    configuration: Configuration, nodes: Sequence[node_table.Node], namespace: str, say: Printer
-) -> None:
-    """Print what each node will get, and where each value comes from."""
+def settings_of(
+    configuration: Configuration, nodes: Sequence[node_table.Node], namespace: str
+) -> Iterator[tuple[str, list[tuple[str, object, str]]]]:
+    """Yield what each node will get: its full name; name, value and origin of each parameter."""
     schema = read_schema()
     for node in nodes:
         full_name = f'{namespace}/{node.name}'
         settings = configuration.resolve(node.name, full_name)
-        table = schema[node.name]
-        rows = [
-            (name, json.dumps(setting.value, ensure_ascii=False), setting.origin)
-            for name, setting in settings.items()
-        ]
+        rows = [(name, setting.value, setting.origin) for name, setting in settings.items()]
         rows += [
-            (name, json.dumps(spec.default, ensure_ascii=False), 'default')
-            for name, spec in table.parameters.items()
+            (name, spec.default, 'default')
+            for name, spec in schema[node.name].parameters.items()
             if name not in settings
         ]
+        yield full_name, sorted(rows, key=lambda row: row[0])
+
+
+def show(
+    configuration: Configuration, nodes: Sequence[node_table.Node], namespace: str, say: Printer
+) -> None:
+    """Print what each node will get, and where each value comes from."""
+    for full_name, rows in settings_of(configuration, nodes, namespace):
         width = max((len(name) for name, _, _ in rows), default=0)
         say(f'{full_name}')
-        for name, value, origin in sorted(rows):
-            say(f'  {name:<{width}}  {value}  ({origin})')
+        for name, value, origin in rows:
+            say(f'  {name:<{width}}  {json.dumps(value, ensure_ascii=False)}  ({origin})')
+
+
+def show_json(
+    configuration: Configuration, nodes: Sequence[node_table.Node], namespace: str, say: Printer
+) -> None:
+    """Print the same for programs."""
+    told = {
+        full_name: {name: {'value': value, 'origin': origin} for name, value, origin in rows}
+        for full_name, rows in settings_of(configuration, nodes, namespace)
+    }
+    say(json.dumps(told, ensure_ascii=False))

@@ -57,6 +57,10 @@ EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
 
 
+LOST = 'Mission: '
+"""How the summary begins of a mission whose record cannot be read."""
+
+
 @dataclass(frozen=True)
 class RunJob:
     """What a run is for that ends by itself.
@@ -280,7 +284,8 @@ def _supervised(
             continue
         done = summary(record_in(part.folder(folder)))
         log.plain(f'{part.robot}: {done}' if part.robot else done)
-        if supervisor.time_is_over and done == NOTHING_RECORDED:
+        is_lost = done.startswith(LOST)
+        if is_lost or (supervisor.time_is_over and done == NOTHING_RECORDED):
             code = code or EXIT_NOTHING_DONE
     return code
 
@@ -321,7 +326,7 @@ def summary(record: Path) -> str:
         text = str(mission_log.summary_in(record, left_out))
         return f'{text}\n  {left_out.words()}' if left_out.damaged else text
     except FileError as error:
-        return f'Mission: {error}'
+        return f'{LOST}{error}'
 
 
 def _robots(team: Sequence[RobotProcesses], profile: str) -> str:

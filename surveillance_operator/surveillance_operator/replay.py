@@ -15,11 +15,16 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from strict_files.files import FileError
 from strict_files.suggestions import nearest
+from surveillance_operator.desk.documents import DeskDocuments
+from surveillance_operator.desk.event_index import EventIndex, read_run
+from surveillance_operator.desk.questions import EventQuestions
+from surveillance_operator.kept_pictures import kept_picture
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Action, Page
 from surveillance_operator.recording.runs import Recording, find_recordings, run_parser
@@ -75,10 +80,18 @@ class Player:
     Args:
         tracks: What is played, by the robots' names; a robot that was alone has none.
         broadcaster: Where it is shown.
+        index: What happened in the runs; None: nothing is known of it.
     """
 
-    def __init__(self, tracks: Mapping[str, Track], broadcaster: Broadcaster) -> None:
+    def __init__(
+        self,
+        tracks: Mapping[str, Track],
+        broadcaster: Broadcaster,
+        index: EventIndex | None = None,
+    ) -> None:
         self._tracks = dict(tracks)
+        self._index = EventIndex() if index is None else index
+        self._desk: object = None
         self._broadcaster = broadcaster
         self._lock = threading.Lock()
         self._begin = min(each.line.times[0] for each in self._tracks.values())
@@ -124,10 +137,24 @@ class Player:
 
     def see(self) -> None:
         """Show what the lidars saw at this moment of the recording."""
+        self._show_desk(self._time)
         for robot, track in self._tracks.items():
             if track.sights is not None:
                 seen = {'scan': track.sights.scan(self._time)}
                 self._broadcaster.show_parts(seen, None, whole=False, robot=robot)
+
+    @property
+    def time(self) -> float:
+        """The moment that is shown, seconds since 1970."""
+        return self._time
+
+    def _show_desk(self, at: float) -> None:
+        """Show which alarms were open at a moment, and how far each was."""
+        found = [each.to_json(at, later=True) for each in self._index.were_open_at(at)]
+        if found != self._desk:
+            self._desk = found
+            part = {'at': round(at, 2), 'count': len(found), 'open': found, 'mutes': []}
+            self._broadcaster.show_desk(part)
 
     def jpeg(self, robot: str) -> bytes | None:
         """Return what a robot's camera saw at this moment of the recording."""
@@ -237,10 +264,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             recordings = find_recordings(options.run, options.runs)
             broadcaster = Broadcaster()
-            player = open_player(recordings, broadcaster, stack)
+            index = index_of(recordings)
+            player = open_player(recordings, broadcaster, stack, index)
+            runs = next(iter(recordings.values())).run.parent
             page = Page(
                 broadcaster,
-                questions={},
+                questions=EventQuestions(index, time.time, lambda: player.time).all(),
+                documents=DeskDocuments(index, runs, lambda: player.time).all(),
+                evidence=partial(kept_picture, runs),
                 actions=player.actions(),
                 picture=player.jpeg,
                 host=host,
@@ -266,7 +297,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def open_player(
-    recordings: Mapping[str, Recording], broadcaster: Broadcaster, stack: contextlib.ExitStack
+    recordings: Mapping[str, Recording],
+    broadcaster: Broadcaster,
+    stack: contextlib.ExitStack,
+    index: EventIndex | None = None,
 ) -> Player:
     """Return a player of the recordings of a run's robots; what it needs ends with the stack.
 
@@ -286,7 +320,15 @@ def open_player(
         raise problems[0]
     for problem in problems:
         print(f'replay: {problem}: it is left out', file=sys.stderr)
-    return Player(tracks, broadcaster)
+    return Player(tracks, broadcaster, index)
+
+
+def index_of(recordings: Mapping[str, Recording]) -> EventIndex:
+    """Return what happened in the runs of recordings; nothing of another program's."""
+    index = EventIndex()
+    for run in {each.run for each in recordings.values() if each.log is not None}:
+        read_run(index, run)
+    return index
 
 
 def _track(recording: Recording, stack: contextlib.ExitStack) -> Track:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import base64
 import contextlib
 import io
@@ -555,6 +556,40 @@ def _write_days(
     return 0 if written else 2
 
 
+def hours_of(text: str) -> float:
+    """Return the hours that a text says.
+
+    Raises:
+        argparse.ArgumentTypeError: It says none, or more than a month.
+    """
+    try:
+        hours = float(text.removesuffix('h'))
+    except ValueError:
+        hours = math.nan
+    if not 0 < hours <= 744:
+        raise argparse.ArgumentTypeError(f'{text!r}: expected hours, such as 8')
+    return hours
+
+
+def _write_shift(folder: Path, hours: float, of: str, as_table: bool) -> Path:
+    """Write the hand-over of the hours before the end of a run; return where it is."""
+    from surveillance_operator.desk.documents import DeskDocuments
+    from surveillance_operator.desk.event_index import EventIndex, folders_of, read_run
+
+    index = EventIndex()
+    runs = [each for each in folder.resolve().parent.iterdir() if each.is_dir()]
+    for run in runs:
+        read_run(index, run, live=run.name == folder.resolve().name)
+    logs = [record_in(own) for _, own in folders_of(folder)]
+    end = max((path.stat().st_mtime for path in logs), default=time.time())
+    documents = DeskDocuments(index, folder.resolve().parent, lambda: end)
+    form = 'csv' if as_table else 'html'
+    made = documents.report(str(end - 3600 * hours), str(end), of, form)
+    path = folder / f'{of}_{time.strftime("%Y-%m-%d", time.localtime(end))}.{form}'
+    replace_text(path, made.content.decode())
+    return path
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the report of a run and say where; the exit code is 2 for bad input."""
     parser = run_parser('report', 'Writes what a mission did into one HTML file.')
@@ -566,9 +601,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         '--sharp', action='store_true', help='with --day: do not blur people in its pictures'
     )
+    parser.add_argument(
+        '--shift',
+        metavar='HOURS',
+        type=hours_of,
+        help='instead, the hand-over of the hours before the end of the run',
+    )
+    parser.add_argument(
+        '--week', action='store_true', help='instead, the seven days before the end of the run'
+    )
+    parser.add_argument(
+        '--csv', action='store_true', help='with --shift or --week: the alarms as CSV'
+    )
     options = parser.parse_args(argv)
     try:
         folder = find_run(options.run, options.runs)
+        if options.shift is not None or options.week:
+            hours = 168.0 if options.week else options.shift
+            print(_write_shift(folder, hours, 'week' if options.week else 'shift', options.csv))
+            return 0
         if options.day is not None:
             from surveillance_operator.day_report import write_day  # its pictures take time
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import threading
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from surveillance_interfaces.msg import ObservedEvents
+from surveillance_operator.kept_pictures import kept_picture
 from surveillance_perception.observing.conversions import event_from_ros
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import name_for
@@ -16,8 +16,6 @@ from surveillance_runtime.state_topics import StateSubscription
 
 MOST_EVENTS = 2000
 """A message with more is not read."""
-_PICTURE = re.compile(r'\d_\d{13}_[A-Za-z0-9-]{1,60}\.jpg\Z')
-_FOLDER = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}')
 _ANSWERED = ('normal', 'acknowledged', 'false alarm')
 
 
@@ -66,16 +64,10 @@ class Sightings:
             run: Of which run beside this one; empty: of this one.
             blur: Whether it leaves this machine: then people in it are blurred.
         """
-        is_sound = all(not each or _FOLDER.fullmatch(each) for each in (robot, run))
-        if self._folder is None or not is_sound or not _PICTURE.match(name):
+        if self._folder is None:
             return None
-        # Each robot of a fleet has a folder of its own in that of the run.
-        of_run = self._folder.parent.parent / run if run else self._folder.parent
-        folder = of_run / robot / self._folder.name
-        try:
-            return _shown(folder / name, blur=blur)
-        except OSError:
-            return None
+        own = self._folder.parent
+        return kept_picture(own.parent, name, robot, run or own.name, blur)
 
     def _on_events(self, robot: str, message: ObservedEvents) -> None:
         try:
@@ -87,16 +79,3 @@ class Sightings:
             return
         with self._lock:
             self._events[robot] = events
-
-
-@lru_cache(64)
-def _shown(path: Path, *, blur: bool) -> bytes:
-    if not blur:
-        return path.read_bytes()
-    # It takes its time, and a page on this machine needs none of it.
-    from indoor_watch.privacy import PictureError, shareable
-
-    try:
-        return shareable(path)
-    except PictureError as error:
-        raise OSError(str(error)) from None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,11 +15,15 @@ from typing import Any
 import pytest
 
 from surveillance_operator import replay, report
+from surveillance_operator.desk.questions import EventQuestions
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
 from surveillance_operator.recording import timeline
+from surveillance_operator.recording.runs import find_recordings
 from surveillance_operator.recording.timeline import Timeline
-from surveillance_operator.replay import Player, Track
+from surveillance_operator.replay import Player, Track, index_of, open_player
+from tests.operator.test_event_index import Run
+from tests.operator.test_timeline import record
 
 
 @pytest.fixture
@@ -270,3 +276,31 @@ def test_a_replay_that_falls_far_behind_jumps(tmp_path: Path) -> None:
     assert json.loads(broadcaster._robots[''].texts['pose'][1]) == [900, 0, 0]
     player._forward(1.0)
     assert read[-1] == 901
+
+
+def test_a_replay_shows_the_alarms_as_they_were(tmp_path: Path) -> None:
+    run = tmp_path / '20260101-000000'
+    made = Run(run)
+    record(run / 'timeline.jsonl')
+    made.now = 1050.0
+    made.incident('abc', 'begin')
+    made.now = 1100.0
+    made.say('acknowledge', 'abc')
+    made.now = 1150.0
+    made.incident('abc', 'end')
+    shown: list[Any] = []
+    broadcaster = Broadcaster()
+    broadcaster.show_desk = lambda part: shown.append(  # type: ignore[method-assign]
+        [each['state'] for each in part['open']]
+    )
+    with contextlib.ExitStack() as stack:
+        recordings = find_recordings(str(run), tmp_path)
+        index = index_of(recordings)
+        player = open_player(recordings, broadcaster, stack, index)
+        for at in (10, 60, 110, 160, 60):
+            player.seek(at)
+            player.see()
+        asked = EventQuestions(index, time.time, lambda: player.time)
+        player.seek(10)
+        assert (asked.search()['count'], asked.search(whole='1')['count']) == (0, 1)
+    assert shown == [[], ['unacknowledged'], ['acknowledged'], [], ['unacknowledged']]

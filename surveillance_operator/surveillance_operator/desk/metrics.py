@@ -78,7 +78,11 @@ def metrics(
     add(
         'patrol_alarms',
         'Alarms that are open, by their state.',
-        (({'state': state}, float(counts[str(state), True])) for state in AlarmState),
+        (
+            ({'state': state}, float(counts[str(state), True]))
+            for state in AlarmState
+            if state is not AlarmState.OVER
+        ),
     )
     warnings = sum(count for (_, is_alarm), count in counts.items() if not is_alarm)
     add('patrol_warnings', 'Warnings that go on.', [({}, float(warnings))])

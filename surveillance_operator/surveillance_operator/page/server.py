@@ -84,7 +84,7 @@ DOCUMENT_POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
-UNTOLD = ('drive', 'links')
+UNTOLD = ('drive', 'links', 'sinks')
 """Actions that are in no log: a stick that is held sends ten a second."""
 LINK_PERIOD = 2.0
 """Seconds after which it is seen that a link was taken back, in a stream that goes on."""

@@ -48,6 +48,7 @@ class Recording:
         messages: The folder or file of its messages, if there are any.
         is_whole: Whether it has its time line.
         log: What happened; None: another program recorded it.
+        robot: Whose it is; empty: of a robot that was alone.
     """
 
     name: Path
@@ -55,6 +56,12 @@ class Recording:
     messages: Path | None
     is_whole: bool
     log: Path | None = None
+    robot: str = ''
+
+    @property
+    def run(self) -> Path:
+        """The folder of the run."""
+        return (self.name.parent if self.robot else self.name).resolve()
 
 
 def find_recordings(name: str, runs: Path) -> dict[str, Recording]:
@@ -71,21 +78,21 @@ def find_recordings(name: str, runs: Path) -> dict[str, Recording]:
     if given.is_dir() and not is_run(given) and not is_run(given.parent):
         return {'': _foreign(given, files_of(given)[0].parent)}
     folder = find_run(name, runs)
-    found = {robot: _recorded(own) for robot, own in robots_of(folder).items()}
+    found = {robot: _recorded(own, robot) for robot, own in robots_of(folder).items()}
     recordings = {robot: each for robot, each in found.items() if each is not None}
     if not recordings:
         raise FileError(f'{folder}: nothing was recorded')
     return recordings
 
 
-def _recorded(folder: Path) -> Recording | None:
+def _recorded(folder: Path, robot: str) -> Recording | None:
     """Return what there is to replay of one robot's run."""
     line, recorded = folder / TIMELINE, folder / RECORDING
     has_messages = recorded.is_dir() and any(recorded.glob(f'*{SUFFIX}'))
     if not line.is_file() and not has_messages:
         return None
     messages = recorded if has_messages else None
-    return Recording(folder, line, messages, line.is_file(), record_in(folder))
+    return Recording(folder, line, messages, line.is_file(), record_in(folder), robot)
 
 
 def _foreign(name: Path, messages: Path) -> Recording:

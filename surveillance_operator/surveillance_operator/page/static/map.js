@@ -38,7 +38,7 @@ export class MapView {
     svg.addEventListener('pointerdown', (event) => this.down(event));
     svg.addEventListener('pointermove', (event) => this.move(event));
     for (const end of ['pointerup', 'pointercancel']) svg.addEventListener(end, (event) => this.up(event));
-    svg.addEventListener('keydown', (event) => this.key(event));
+    svg.addEventListener('keydown', (event) => this.onKey(event));
     for (const button of document.querySelectorAll('[data-zoom]')) button.addEventListener('click', () => this.press(button.dataset.zoom));
     document.getElementById('follow').addEventListener('click', () => this.follow(!this.following));
     this.offer();
@@ -70,7 +70,7 @@ export class MapView {
     if (word === 'whole') { this.follow(false); this.zoom = 1; this.centre = null; this.look(); } else this.zoomBy(word === 'in' ? STEP : 1 / STEP);
   }
 
-  key(event) {
+  onKey(event) {
     const ways = {ArrowLeft: [-.2, 0], ArrowRight: [.2, 0], ArrowUp: [0, .2], ArrowDown: [0, -.2]};
     if (event.key === '+' || event.key === '=') this.zoomBy(STEP);
     else if (event.key === '-') this.zoomBy(1 / STEP);
