@@ -118,10 +118,11 @@ def _dispatch(argv: list[str]) -> int:
         'service': _service,
         'completion': _completion,
         'setup': _setup,
+        'lock': _lock,
         'test': _test,
         'lint': _lint,
     }
-    if argv and argv[0] in ('setup', 'test', 'lint') and INSTALLED:
+    if argv and argv[0] in ('setup', 'lock', 'test', 'lint') and INSTALLED:
         raise ValueError(f'{argv[0]!r} works in a checkout only: this is an installed {PROGRAM}')
     if argv and argv[0] in commands:
         return commands[argv[0]](argv[1:])
@@ -311,6 +312,16 @@ def _service(argv: list[str]) -> int:
     print(f'written: {path}')
     print(f'start it: systemctl --user daemon-reload && systemctl --user enable --now {path.name}')
     print('to run it without a login: loginctl enable-linger')
+    return 0
+
+
+def _lock(argv: list[str]) -> int:
+    CommandParser(
+        prog=f'{PROGRAM} lock',
+        description='Writes the lock file of this Python and machine anew: the newest packages '
+        'that pyproject.toml allows, each by its hash.',
+    ).parse_args(argv)
+    print(f'written: {PythonEnvironment(CHECKOUT).write_lock()}')
     return 0
 
 

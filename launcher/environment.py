@@ -29,7 +29,7 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from launcher import nav2_messages, system
+from launcher import nav2_messages, package_lock, system
 from launcher.progress import Output, SetUpStep
 from strict_files.files import replace_text
 from strict_files.regular_files import parse_json
@@ -127,6 +127,17 @@ def requirements(checkout: Path, extras: Iterable[str]) -> list[str]:
         # Libraries are imported from the checkout: what they need themselves is installed.
         wanted |= dict.fromkeys(_project(project_file.parent)['dependencies'])
     return [line for line in wanted if line.partition('=')[0] not in LIBRARIES]
+
+
+def required_lists(checkout: Path) -> dict[str, list[str]]:
+    """Return what the robot requires, and each group of optional dependencies that is locked."""
+    own = requirements(checkout, ())
+    optional = {
+        extra: [line for line in requirements(checkout, [extra]) if line not in own]
+        for extra in package_lock.LOCKED_EXTRAS
+        if extra in _project(checkout)['optional-dependencies']
+    }
+    return {package_lock.ROBOT: own, **optional}
 
 
 def _build_requirements(folder: Path) -> list[str]:
@@ -416,8 +427,7 @@ class PythonEnvironment:
                 journal.working = PACKAGES_STEP
                 journal.write(self.venv)
                 with step:
-                    needed = requirements(self.checkout, journal.extras)
-                    start(self._pip('install', *needed)).watch(step)
+                    start(self._pip('install', *self._needed(journal.extras))).watch(step)
                 journal.packages = wanted.packages
             if step := steps.get(INTERFACES_STEP):
                 journal.working = INTERFACES_STEP
@@ -429,6 +439,33 @@ class PythonEnvironment:
                     start(self._pip('install', *options, *built)).watch(step)
                 shutil.rmtree(wheels)
                 journal.interfaces = wanted.interfaces
+
+    def _needed(self, extras: Sequence[str]) -> list[str]:
+        """Return what pip is to install: files by their hashes, where a lock file fits.
+
+        Raises:
+            FileError: The lock file is damaged.
+        """
+        lists, why = required_lists(self.checkout), 'they come from a folder'
+        if self.wheels is None:
+            needed, why = package_lock.locked(self.checkout, lists, extras)
+        if why:
+            print(f'Packages are installed without hashes: {why}.', flush=True)
+            return requirements(self.checkout, extras)
+        path = self.venv / 'locked.txt'
+        path.write_text('\n'.join(needed) + '\n', encoding='utf-8')
+        return ['--require-hashes', '-r', str(path)]
+
+    def write_lock(self) -> Path:
+        """Write the lock file of this Python and machine anew; the next start installs by it.
+
+        Raises:
+            NotNowError: A package cannot be found or fetched.
+        """
+        self.prepare()
+        return package_lock.write_lock(
+            self.python, self.checkout, required_lists(self.checkout), clean_environ()
+        )
 
     def _seed(self, python: str) -> tuple[Path, int] | None:
         """Begin a new environment with what one in use has: files are shared until they change.

@@ -50,6 +50,7 @@ commands (each has its own --help):
   params [NODE]             print the value of each parameter and where it comes from
   service                   write a systemd unit that keeps the robot running
   setup                     only set up .venv
+  lock                      write the lock file of this Python: packages by their hashes
   test [pytest args]        run the test suite
   lint                      check format, lint and types
 """

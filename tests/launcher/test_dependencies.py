@@ -35,6 +35,7 @@ OPTIONAL = {
     'mujoco',
     'launch',
     'launch_ros',
+    'pip',
 }
 # Known to type checkers alone.
 TYPES = {'_typeshed'}
