@@ -53,6 +53,7 @@ from surveillance_runtime.conversions import (
     pose_from,
     seconds_of,
 )
+from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.parameters import declared_frames
@@ -126,6 +127,7 @@ class Explorer(PatrolNode):
         # Another program that maps has its own way with odometry that begins anew.
         self._continuous = ContinuousOdometry() if self._foreign is None else None
         self._odometry: Pose | None = None
+        self._owed: Velocity | None = None
         self._heard_scan = False
         self._scans = self._left_out = self._told_left_out = 0
         # No setting of the clock makes a drive wait, or give up.
@@ -218,7 +220,15 @@ class Explorer(PatrolNode):
                 stands=stands,
                 maps=seen is not None,
             )
-            self._base.command(velocity.slowed_to(self._mounts.top_speed))
+            velocity = velocity.slowed_to(self._mounts.top_speed)
+            if self.exploration.is_behind(odometry):
+                # What was seen first goes into the map. Simulated time waits for a command.
+                self._owed = velocity
+                if not self.is_simulated:
+                    self._base.command(Velocity())
+            else:
+                self._owed = None
+                self._base.command(velocity)
         self._tell_pose(odometry, reading, stamp)
 
     def _on_hold(self) -> None:
@@ -241,6 +251,7 @@ class Explorer(PatrolNode):
         told, phase, goal = time.monotonic() - _TELL, self.exploration.phase, None
         while not self.stopping.is_set():
             changed = self.exploration.think()
+            self._pay()
             if self.stopping.is_set():
                 return  # it was told to end, and has not seen all
             if changed:
@@ -268,6 +279,13 @@ class Explorer(PatrolNode):
                 self.get_logger().info(f'waiting for {missing}')
             if not changed:
                 self.stopping.wait(_WAIT)
+
+    def _pay(self) -> None:
+        """Give the command that waited until what was seen was in the map."""
+        with self._lock:
+            if self._owed is not None:
+                self._base.command(Velocity() if self._hold.active else self._owed)
+                self._owed = None
 
     def _tell_left_out(self) -> None:
         """Say that scans are left out, when there are more than were told by a tenth of all."""
@@ -320,6 +338,12 @@ class Explorer(PatrolNode):
             f'({each.point[0]:.1f}, {each.point[1]:.1f}), {each.length:.1f} m: {each.reason}'
             for each in exploration.unreached
         ]
+        if exploration.bent:
+            x, y, _ = exploration.bent[0]
+            left.append(
+                f'the map contradicts itself, as near ({x:.1f}, {y:.1f}): walls are bent or drawn '
+                'twice; explore again, more slowly, and use no part of it before'
+            )
         if exploration.reason:
             left.append(f'the robot is not back at its start: {exploration.reason}')
         for each in left:
@@ -332,7 +356,11 @@ class Explorer(PatrolNode):
                 logger.error(f'what is left is not kept: {in_one_line(error)}')
         if self._left_out:
             logger.info(f'{self._left_out} of {self._scans} scans were left out of the map')
-        logger.info('all that can be reached has been seen')
+        if exploration.bent:
+            self.incidents.begin(('robot', 'map'), left[-1], Severity.ALARM)
+            logger.error('the map is not to be trusted: it contradicts itself')
+        else:
+            logger.info('all that can be reached has been seen')
         self.finish()
 
     def on_stop(self) -> None:

@@ -276,7 +276,10 @@ class StateSubscription(Generic[M]):
         if self._stamp is None or heard == self._trust.value:
             return False
         message = heard if self._raw else deserialize_message(heard, self._kind)
-        ahead = self._stamp(message) - 1e-9 * self._node.get_clock().now().nanoseconds
+        clock = self._node.get_clock().now().nanoseconds
+        if self._ahead == AHEAD_SIMULATED and clock == 0:
+            return False  # one that has just begun has not heard the time yet
+        ahead = self._stamp(message) - 1e-9 * clock
         if ahead <= self._ahead:
             return False
         now = time.monotonic()

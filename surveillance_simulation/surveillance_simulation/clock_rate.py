@@ -1,7 +1,8 @@
 """The rate of simulated time: the real-time factor, and lockstep with the robot's programs.
 
-`speed` is simulated seconds per real second; 0 means as fast as the robot's programs keep up. Then
-a ceiling bounds the rate, and time stands still while a program is at work on its answer:
+`speed` is simulated seconds per real second; 0 means as fast as the robot's programs keep up, with
+a ceiling. Whatever the speed, but the real one: time stands still while a program is at work on its
+answer, so that a busy machine is slower and no robot loses what it would not lose in real time:
 
 - a controller on the next command, while the base is under command or a drive is executed: each
   measurement has its command before the next one is made;
@@ -37,6 +38,10 @@ OBEYS_WITHIN = 0.02
 not with the next measurement. At full speed no sleep is longer: a command may end the idle step."""
 LONGEST_DEBT = 0.5
 """What a busy machine falls behind by more than this is not caught up with, simulated seconds."""
+LOOKED_OVER = 20.0
+"""Over this time it is looked whether the machine keeps up, real seconds;"""
+TOO_SLOW = 0.7
+"""it does not if less than this share of the speed is reached."""
 
 
 @dataclass(frozen=True)
@@ -249,6 +254,8 @@ class ClockRate:
         self.pause: float | None = None
         self.robots = tuple(Lockstep(model) for _ in range(robots))
         self.is_waiting = False
+        self._looked = steady, 0.0
+        self._passed = 0.0
 
     @property
     def awaits_picture(self) -> bool:
@@ -258,8 +265,22 @@ class ClockRate:
     def waits(self, simulated: float, steady: float) -> bool:
         """Return whether time stands still until a program answers; times as for `due`."""
         late = [robot.is_late(simulated, steady) for robot in self.robots]
-        self.is_waiting = self._model.speed == 0.0 and any(late)
+        self.is_waiting = self._model.speed != 1.0 and any(late)
         return self.is_waiting
+
+    def too_slow(self, steady: float) -> float | None:
+        """Return the speed that is reached where the machine does not keep up; None: it does, or
+        it is too early to tell.
+
+        Args:
+            steady: Reading of the steady clock, seconds.
+        """
+        since, before = self._looked
+        if self._model.speed == 0.0 or steady - since < LOOKED_OVER:
+            return None
+        reached = (self._passed - before) / (steady - since)
+        self._looked = steady, self._passed
+        return reached if reached < TOO_SLOW * self._model.speed else None
 
     def due(self, simulated: float, steady: float, *, moving: bool) -> float:
         """Return how many simulated seconds pass now; 0 to wait.
@@ -274,7 +295,7 @@ class ClockRate:
         step = model.step
         if self.waits(simulated, steady):
             # Ready to go on at once when the answer comes.
-            self._owed = min(self._owed + elapsed * model.ceiling, step)
+            self._owed = min(self._owed + elapsed * (model.speed or model.ceiling), step)
             return 0.0
         if model.speed == 0.0:
             busy = any(each.is_looking(simulated) or each.is_executing for each in self.robots)
@@ -289,6 +310,7 @@ class ClockRate:
         passed = 0.0
         if self._owed >= step - 1e-9:
             self._owed -= step
+            self._passed += step
             passed = step
         if model.speed == 0.0:
             self.pause = min(max(step - self._owed, MIN_STEP) / model.ceiling, OBEYS_WITHIN)

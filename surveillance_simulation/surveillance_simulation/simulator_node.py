@@ -44,6 +44,7 @@ from surveillance_runtime.state_topics import StateSubscription
 from surveillance_simulation import conversions
 from surveillance_simulation.clock_rate import (
     DRIVING,
+    LOOKED_OVER,
     OBEYS_WITHIN,
     PLANNING,
     ClockRate,
@@ -150,7 +151,9 @@ class Simulator(PatrolNode):
         self._measurement_period = rate.step if rate.speed else 0.0
         self._next_measurement = self.robots.time + self._measurement_period
         if rate.speed:
-            rate = replace(rate, step=min(rate.step, OBEYS_WITHIN * rate.speed))
+            # A command is late when it has not come some time after the next measurement.
+            window = rate.step + rate.window
+            rate = replace(rate, step=min(rate.step, OBEYS_WITHIN * rate.speed), window=window)
         sensors = SensorSetup.declared(self, physics)
         cameras = CameraSetup(self, sensors.frames.camera)
         self._place = PlaceFeed(self, world, sensors, drives_clock=self._drives_clock)
@@ -176,6 +179,8 @@ class Simulator(PatrolNode):
         self._measure()
         self._timer = self.create_timer(rate.period, self._tick, clock=steady)
         self.create_timer(LOOK_PERIOD, self._look_again, clock=steady)
+        self._speed, self._is_too_slow = rate.speed, False
+        self.create_timer(LOOKED_OVER / 2, self._look_at_speed, clock=steady)
         if self._drives_clock:
             self._told_of_clock = False
             self.create_timer(1.0, self._look_for_another_clock, clock=steady)
@@ -308,6 +313,17 @@ class Simulator(PatrolNode):
                     # The last one may have been taken before the rest was known.
                     body.camera.ask()
         self.go_on()
+
+    def _look_at_speed(self) -> None:
+        """Say once that the machine does not keep up; time is slower then, and nothing is lost."""
+        with self._changing:
+            reached = self._rate.too_slow(time.monotonic())
+        if reached is not None and not self._is_too_slow and self._drives_clock:
+            self._is_too_slow = True
+            self.get_logger().warn(
+                f'the machine is too slow for speed {self._speed:g}: time goes {reached:.1f} times '
+                'as fast as in reality, and waits for the robot'
+            )
 
     def _look_for_another_clock(self) -> None:
         others = self.count_publishers('/clock') - 1

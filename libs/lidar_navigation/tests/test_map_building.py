@@ -12,6 +12,7 @@ import pytest
 
 from floor_plans import Grid
 from lidar_navigation import MapBuilder, MappingParameters
+from lidar_navigation.exploration import map_building
 from lidar_navigation.geometry import Pose, Scan
 
 ANGLES = (np.arange(180) + 0.5) * math.tau / 180 - math.pi
@@ -170,3 +171,30 @@ def test_beyond_the_reach_a_ray_shows_neither_walls_nor_floor() -> None:
     assert (walls.min(axis=1) < 0.1).all()
     assert walls[:, 0].min() < 0.1
     assert walls[:, 1].min() < 0.1
+
+
+def test_a_map_that_contradicts_itself_is_told_and_mended_where_a_loop_was_missed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The round is short: nine scans in all.
+    monkeypatch.setattr(map_building, '_LEAST_WRONG', 2)
+    builder = driven(0.5, {'loop_agreement': 1.01})
+    assert builder.loops == 0
+    assert builder.contradictions()
+    assert builder.repair(), 'nothing mends it'
+
+    builder.parameters = replace(builder.parameters, loop_agreement=0.6)
+    assert builder.repair() == []
+    assert builder.loops >= 1
+    assert math.dist(builder.graph.poses[-1][:2], START[:2]) < 0.2, '0.5 before'
+
+
+def test_a_map_that_is_sound_contradicts_nothing_though_a_wall_was_moved() -> None:
+    builder = driven(0.02, {})
+    loops = builder.loops
+    assert builder.contradictions() == []
+    moved = room((2.0, 1.5, 0.0))
+    moved.ranges[:20] += 1.0
+    builder.see(moved, (2.02, 1.5, 0.0), keep=True)
+    assert builder.repair() == []
+    assert builder.loops - loops <= 1

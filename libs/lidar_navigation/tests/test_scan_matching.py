@@ -218,11 +218,11 @@ def test_rays_that_go_on_behind_a_line_contradict_it(ahead: float, through: floa
     ranges = np.full(400, 5.0)
     ranges[np.abs(angles) < 0.3] = ahead
     scan = Scan(angles, ranges, 8.0)
-    assert matcher._seen_through(scan, (0.0, 0.0, 0.0)) == through
+    assert matcher.contradiction(scan, (0.0, 0.0, 0.0)) == through
     mounted = Scan(angles, ranges, 8.0, (-1.0, 0.0, 0.0))
-    assert matcher._seen_through(mounted, (1.0, 0.0, 0.0)) == through
-    assert matcher._seen_through(scan, (0.0, 0.0, math.pi)) == 1.0
-    assert matcher._seen_through(Scan(angles, ranges, 1.9), (0.0, 0.0, 0.0)) == 0.0, 'out of reach'
+    assert matcher.contradiction(mounted, (1.0, 0.0, 0.0)) == through
+    assert matcher.contradiction(scan, (0.0, 0.0, math.pi)) == 1.0
+    assert matcher.contradiction(Scan(angles, ranges, 1.9), (0.0, 0.0, 0.0)) == 0.0, 'out of reach'
 
 
 def test_an_edge_is_seen_past_on_one_side() -> None:
@@ -230,9 +230,9 @@ def test_an_edge_is_seen_past_on_one_side() -> None:
     matcher = Matcher(Surface(wall, np.tile([-1.0, 0.0], (26, 1))))
     angles = np.linspace(-math.pi, math.pi, 400, endpoint=False)
     ranges = np.where(angles < -1e-9, 2.0 / np.maximum(np.cos(angles), 0.1), 5.0)
-    assert matcher._seen_through(Scan(angles, ranges, 8.0), (0.0, 0.0, 0.0)) == 0.0
+    assert matcher.contradiction(Scan(angles, ranges, 8.0), (0.0, 0.0, 0.0)) == 0.0
     behind = Scan(angles[150:250], np.full(100, 5.0), 8.0)
-    assert matcher._seen_through(behind, (4.0, 0.0, 0.0)) == 0.0, 'what is not in view'
+    assert matcher.contradiction(behind, (4.0, 0.0, 0.0)) == 0.0, 'what is not in view'
 
 
 def test_a_match_says_where_a_scan_was_made_and_how_well_it_fits() -> None:

@@ -33,7 +33,7 @@ _SURE = 0.8
 
 
 @dataclass(eq=False)
-class _Door:
+class _SeenDoor:
     segment: Segment
     readings: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=READINGS))
     shut_at: float | None = None
@@ -47,7 +47,7 @@ class DoorSight:
     """
 
     def __init__(self, doors: Mapping[str, Segment]) -> None:
-        self._doors = {name: _Door(segment) for name, segment in doors.items()}
+        self._doors = {name: _SeenDoor(segment) for name, segment in doors.items()}
         self._read_at = -math.inf
         self._shut: frozenset[str] = frozenset()
 
@@ -67,7 +67,7 @@ class DoorSight:
         self._doors = {
             name: before[name]
             if name in before and before[name].segment == segment
-            else _Door(segment)
+            else _SeenDoor(segment)
             for name, segment in doors.items()
         }
         self._shut &= self._doors.keys()
@@ -104,7 +104,7 @@ class DoorSight:
         return self._shut != before
 
     @staticmethod
-    def _read(door: _Door, lidar: Pose, ends: np.ndarray, now: float) -> None:
+    def _read(door: _SeenDoor, lidar: Pose, ends: np.ndarray, now: float) -> None:
         reading = read_door(door.segment, lidar[:2], ends)
         if reading is None or reading.confidence < _SURE:
             return

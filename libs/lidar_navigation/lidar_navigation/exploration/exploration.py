@@ -22,6 +22,7 @@ from floor_plans.occupancy_grid import distance_to
 from lidar_navigation.driving.driving import Drive, DriveState, Spin
 from lidar_navigation.driving.path_following import DriveParameters, Velocity
 from lidar_navigation.exploration.frontiers import Frontier, FrontierParameters, find_frontiers
+from lidar_navigation.exploration.map_building import MapBuilder
 from lidar_navigation.geometry import Points, Pose, Scan, composed, in_map, relative
 from lidar_navigation.planning.grid_planning import GridPlanner, NoPathError, PlanningParameters
 
@@ -98,6 +99,8 @@ class Exploration:
         phase: What the robot is about.
         goal: The frontier that it drives to.
         reason: Why the robot is not back at its start, if it is not.
+        bent: From where scans were made that contradict the map, though it was mended; empty: it
+            agrees with all that was seen.
     """
 
     builder: Mapping
@@ -107,6 +110,7 @@ class Exploration:
     phase: Phase = field(default=Phase.STARTING, init=False)
     goal: Frontier | None = field(default=None, init=False)
     reason: str = field(default='', init=False)
+    bent: list[Pose] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
         self._lock = threading.Lock()
@@ -119,6 +123,7 @@ class Exploration:
         self._left: list[Frontier] = []
         self._spent: list[tuple[Points, str]] = []
         self._looked = False
+        self._mended_at = -1
         self._now = self._arrived_at = self._stood = 0.0
         self._heard_at: float | None = None
 
@@ -272,6 +277,8 @@ class Exploration:
                 self._grid, self._planner.cost, self._here, self.frontiers, spent
             )
             able = [each for each in self._left if each.viewpoint is not None]
+            if not able and self._mend():
+                continue
             if not able:
                 self.goal = None
                 self.phase = Phase.RETURNING
@@ -287,6 +294,36 @@ class Exploration:
                 self.goal = chosen
                 return
             self._give_up(chosen, self.reason)
+
+    def _mend(self) -> bool:
+        """Look whether the map contradicts itself, before it is called whole; tell whether it
+        changed by that, so that there may be more to see.
+        """
+        if not isinstance(self.builder, MapBuilder) or self._mended_at == self.builder.kept:
+            return False
+        self._mended_at = self.builder.kept
+        loops = self.builder.loops
+        self.bent = self.builder.repair()
+        if self.builder.loops == loops or self._scan is None:
+            return False
+        grid, odometry = self.builder.grid(), self._scan[1]
+        planner = GridPlanner(grid, self.planning)
+        with self._lock:
+            pose = self.builder.pose(odometry)
+            self._correction = composed(pose, relative(odometry, (0.0, 0.0, 0.0)))
+            self._grid, self._planner = grid, planner
+        return True
+
+    def is_behind(self, odometry: Pose) -> bool:
+        """Tell whether the robot is so far from where a scan waits to be mapped that the next one
+        is due: what lies between may be too far to be matched.
+        """
+        with self._lock:
+            if self._pending is None or not isinstance(self.builder, MapBuilder):
+                return False
+            step = relative(self._pending[1], odometry)
+        p = self.builder.parameters
+        return math.hypot(*step[:2]) >= p.keep_distance or abs(step[2]) >= p.keep_turn
 
     @staticmethod
     def _apart(first: Frontier, second: Frontier | None) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -31,6 +31,14 @@ from strict_files.settings import parameter
 
 _LONGEST_STEP = 10.0
 """No robot drives so far between two scans that are kept, metres: the odometry began anew."""
+
+_CONTRADICTS, _CHECK_THROUGH, _CHECK_AROUND = 0.12, 0.2, 3.0
+"""A scan contradicts the map if its rays go through a greater part of what is in view, by more than
+this, metres; of what was seen from so near by, metres."""
+_LEAST_WRONG = 4
+"""So many scans must, so that the map counts as bent."""
+_REPAIRS = 3
+"""So often missed loops are looked for."""
 
 
 @dataclass(frozen=True)
@@ -219,16 +227,59 @@ class MapBuilder:
     def _neighbours(self) -> dict[int, list[tuple[int, float]]]:
         return self.graph.neighbours()
 
-    def _matcher(self, numbers: list[int]) -> Matcher | None:
+    def _matcher(
+        self, numbers: list[int], matching: MatchingParameters | None = None
+    ) -> Matcher | None:
+        if not numbers:
+            return None
         surfaces = [
             self._kept[number].surface.moved(self.graph.poses[number]) for number in numbers
         ]
         seen = joined(surfaces)
-        return Matcher(seen, self.matching) if len(seen.points) else None
+        return Matcher(seen, matching or self.matching) if len(seen.points) else None
 
-    def _close_loops(self) -> bool:
-        """Look for loops that the last scan closes; tell whether one was found."""
-        p, last = self.parameters, len(self._kept) - 1
+    def contradictions(self) -> list[int]:
+        """Return the kept scans that contradict what others saw from near by, as the poses are.
+
+        Rays go through what others have seen. A door that moved is a small part of what is in view;
+        in a map that is bent walls stand twice.
+        """
+        p = self.parameters
+        places = np.array(self.graph.poses).reshape(-1, 3)
+        matching = replace(self.matching, through=_CHECK_THROUGH)
+        found = []
+        for number, kept in enumerate(self._kept):
+            away = np.hypot(*(places[:, :2] - places[number, :2]).T)
+            near = np.flatnonzero(away <= _CHECK_AROUND)
+            # Also those that were seen long before or after.
+            near = near[np.linspace(0, len(near) - 1, min(len(near), p.most_around)).astype(int)]
+            matcher = self._matcher([each for each in near.tolist() if each != number], matching)
+            pose = self.graph.poses[number]
+            if matcher is not None and matcher.contradiction(kept.scan, pose) > _CONTRADICTS:
+                found.append(number)
+        return found
+
+    def repair(self) -> list[Pose]:
+        """Look for loops that were missed, where the map contradicts itself.
+
+        Returns:
+            From where scans were made that contradict it all the same; empty: it is sound.
+        """
+        wrong = self.contradictions()
+        for _ in range(_REPAIRS):
+            closed = [number for number in wrong if self._close_loops(number)]
+            if not closed:
+                break
+            self._redraw()
+            wrong = self.contradictions()
+        # One alone is a door that was moved, or somebody who stood before the lidar.
+        if len(wrong) < max(_LEAST_WRONG, 0.01 * len(self._kept)):
+            return []
+        return [self.graph.poses[number] for number in wrong]
+
+    def _close_loops(self, number: int = -1) -> bool:
+        """Look for loops that a scan closes, or the last one; tell whether one was found."""
+        p, last = self.parameters, number % len(self._kept)
         pose = self.graph.poses[last]
         places = np.array(self.graph.poses)
         away = np.hypot(*(places[:, :2] - pose[:2]).T)

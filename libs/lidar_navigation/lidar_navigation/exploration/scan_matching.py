@@ -181,7 +181,7 @@ class Matcher:
             return None
         start = self._searched(few.points, guess, window) if max(window) > 0.0 else guess
         pose, information = self._refined(few, start, guess, prior)
-        return Match(pose, information, self._agreement(few, pose), self._seen_through(scan, pose))
+        return Match(pose, information, self._agreement(few, pose), self.contradiction(scan, pose))
 
     def _searched(self, points: Points, guess: Pose, window: tuple[float, float]) -> Pose:
         """Return the pose of the window at which the points lie on the brightest pixels."""
@@ -287,8 +287,8 @@ class Matcher:
         off = ((placed.points[near] - self._seen.points[at]) * self._seen.normals[at]).sum(axis=1)
         return float((np.abs(off) <= self._p.agree).sum()) / len(placed.points)
 
-    def _seen_through(self, scan: Scan, pose: Pose) -> float:
-        """Return the part of the lines in view that the scan's rays go through."""
+    def contradiction(self, scan: Scan, pose: Pose) -> float:
+        """Return the part of the lines in view that the scan's rays go through, 0 to 1."""
         x, y, yaw = composed(pose, scan.mount)
         offset = self._seen.points - (x, y)
         distance = np.hypot(*offset.T)

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed
 from lidar_navigation.localisation.odometry import ContinuousOdometry
-from lidar_navigation.localisation.pose_search import found_poses
+from lidar_navigation.localisation.pose_search import MOST, NEAR, found_poses
 from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
 
 
@@ -36,72 +36,82 @@ from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
 class LocalisationParameters:
     """How the localiser works.
 
+    What a pose explains is a part of the rays, 0 to 1, and two poses are compared by its
+    difference. One difference counts, `better`; what else is compared with is a multiple of it.
+
     Attributes:
-        rays: Rays of a scan that are matched.
-        cast_rays: Rays that are cast into the map to measure how well a pose explains a scan.
-        update_distance: A scan is used after this way, metres,
-        update_turn: or this turn, rad,
+        rays: Rays of a scan that are matched; of those two of three are cast into the map.
+        update_step: A scan is used after this way or turn, metres or rad,
         update_period: or this time, seconds; and always while the robot doubts.
         doubt_below: The robot looks for a better pose when a smaller part of the rays agrees,
         doubt_drop: and less than is usual here by this much.
-        usual_rise: By this part of the difference the usual agreement rises with a scan;
-        usual_fall: by this part it falls.
-        lost_below: It counts as lost when none is found and a smaller part than this agrees.
-        better: A pose near the last one must explain this much more to be taken instead.
-        far_better: A pose far away must explain this much more to become a rival: that somebody
-            carried the robot there is unlikely.
-        same_way: A pose that is turned by more than this looks elsewhere, rad.
-        alike: A pose that explains less than the one taken, by at most this, is a rival.
-        most_rivals: At most so many are kept.
-        rival_wins: A rival that explained so much more, summed over scans, is taken instead,
-        equal_wins: or this much more, if it was as likely as the present pose;
-        rival_loses: one that explained so much less is forgotten.
-        forgotten: This part of the sum with each scan that tells something.
-        noise: Of two poses that explain a scan as well the one explains this much more by chance;
-            no more than that counts for nothing.
-        standing: Of a robot that stands this part of the difference counts,
-        standing_from: if it is at least this large.
-        nudge: A correction of more than this, metres or rad, may as well be that somebody put the
-            robot into a place that looks alike.
-        challenger: A challenger loses this much with each scan that the present pose explains.
-        rounds: After so many searches without a winner the present pose is kept.
         doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
             would be lost.
+        lost_below: It counts as lost when none is found and a smaller part than this agrees.
         lost_pause: Time between two looks while it is lost, seconds.
-        near: Radius of the first search around the last pose, metres.
-        at_once: A better pose within this distance is taken at once, metres; a farther one is
-            followed first.
+        better: A pose must explain this much more to be taken instead of another one.
+        slip: So far wheels slip, or somebody pushes the robot, metres or rad: a better pose within
+            that is taken at once; a farther one is followed first.
+        rounds: After so many searches without a winner the present pose is kept.
     """
 
     rays: int = 90
-    cast_rays: int = 60
-    update_distance: float = 0.15
-    update_turn: float = 0.15
+    update_step: float = 0.15
     update_period: float = 0.3
     doubt_below: float = 0.85
     doubt_drop: float = 0.12
-    usual_rise: float = 0.05
-    usual_fall: float = 0.02
-    lost_below: float = 0.55
-    better: float = 0.1
-    far_better: float = 0.2
-    same_way: float = 0.8
-    alike: float = 0.1
-    most_rivals: int = 40
-    rival_wins: float = 0.8
-    equal_wins: float = 0.3
-    rival_loses: float = 0.5
-    forgotten: float = 0.1
-    noise: float = 0.05
-    standing: float = 0.7
-    standing_from: float = 0.2
-    nudge: float = 0.2
-    challenger: float = 0.05
-    rounds: int = 5
     doubt_time: float = 0.2
+    lost_below: float = 0.55
     lost_pause: float = 1.0
-    near: float = 2.5
-    at_once: float = 1.0
+    better: float = 0.1
+    slip: float = 1.0
+    rounds: int = 5
+
+    @property
+    def cast_rays(self) -> int:
+        """Rays that are cast into the map to measure how well a pose explains a scan."""
+        return 2 * self.rays // 3
+
+    @property
+    def far_better(self) -> float:
+        """How much more a pose far away must explain: that somebody carried the robot is unlikely.
+        Likewise what a robot that stands must see of a rival, for it sees the same again and again.
+        """
+        return 2 * self.better
+
+    @property
+    def noise(self) -> float:
+        """Of two poses that explain a scan as well the one explains this much more by chance.
+
+        A challenger loses as much with each scan that the present pose explains, too.
+        """
+        return self.better / 2
+
+    @property
+    def rival_wins(self) -> float:
+        """A rival that explained so much more, summed over scans, is taken instead,"""
+        return 8 * self.better
+
+    @property
+    def equal_wins(self) -> float:
+        """or this much more, if it was as likely as the present pose."""
+        return 3 * self.better
+
+    @property
+    def rival_loses(self) -> float:
+        """A rival that explained so much less is forgotten."""
+        return 5 * self.better
+
+
+_FORGOTTEN = 0.1
+"""This part of the sum of a rival is forgotten with each scan that tells something."""
+_STANDING = 0.7
+"""Of a robot that stands this part of a difference counts."""
+_USUAL_RISE, _USUAL_FALL = 0.05, 0.02
+"""By these parts of a difference the usual agreement rises and falls with a scan."""
+_NUDGE = 0.2
+"""A correction of more than this, metres or rad, may as well be that somebody put the robot into a
+place that looks alike."""
 
 
 @dataclass
@@ -242,7 +252,7 @@ class Localiser:
             corrected, evidence = self._nudged(corrected, evidence, thin, moved)
             agreement = evidence.fit
             way, turn = math.dist(before[:2], corrected[:2]), angle_between(before[2], corrected[2])
-            if way > p.nudge or abs(turn) > p.nudge:
+            if way > _NUDGE or abs(turn) > _NUDGE:
                 # Somebody may have put it into another room that looks alike.
                 self._shaken = True
         winner = self._weighed(corrected, evidence, thin, moved)
@@ -275,7 +285,7 @@ class Localiser:
         """Correct the rivals by a scan; return the one that wins over the present pose, if any."""
         p = self.parameters
         best: tuple[_Rival, Evidence] | None = None
-        moves = moved[0] >= p.update_distance / 2 or moved[1] >= p.update_turn / 2
+        moves = moved[0] >= p.update_step / 2 or moved[1] >= p.update_step / 2
         # What is new may explain all that speaks against it.
         plausible = evidence.fit >= self._enough or not evidence.refutes
         for rival in self._rivals:
@@ -288,11 +298,11 @@ class Localiser:
             if moves:
                 # What tells nothing makes nothing forgotten, either.
                 if abs(more) > p.noise:
-                    rival.lead += more - p.forgotten * rival.lead
+                    rival.lead += more - _FORGOTTEN * rival.lead
                 if plausible and not rival.is_equal:
-                    rival.lead -= p.challenger
-            elif abs(more) >= p.standing_from:
-                rival.lead += p.standing * more - p.forgotten * rival.lead
+                    rival.lead -= p.noise
+            elif abs(more) >= p.far_better:
+                rival.lead += _STANDING * more - _FORGOTTEN * rival.lead
             if not self._fit.can_stand(rival.pose) or self._same(rival.pose, present):
                 rival.lead = -math.inf
             elif (
@@ -325,8 +335,8 @@ class Localiser:
             self._used_at is None
             or self.lost
             or self._look_at is not None
-            or self._moved[0] >= p.update_distance
-            or self._moved[1] >= p.update_turn
+            or self._moved[0] >= p.update_step
+            or self._moved[1] >= p.update_step
             or now - self._used_at >= p.update_period
         )
 
@@ -389,12 +399,12 @@ class Localiser:
         """Tell whether a push or a slip may have brought the robot there."""
         p = self.parameters
         turned = abs(angle_between(self.pose[2], pose[2]))
-        return math.dist(pose[:2], self.pose[:2]) <= p.at_once and turned <= p.same_way
+        return math.dist(pose[:2], self.pose[:2]) <= p.slip and turned <= 0.8 * p.slip
 
     def _needed(self, pose: Pose) -> float:
         """Return how much more a pose must explain to be followed."""
         p = self.parameters
-        return p.better if math.dist(pose[:2], self.pose[:2]) <= p.near else p.far_better
+        return p.better if math.dist(pose[:2], self.pose[:2]) <= NEAR else p.far_better
 
     @property
     def _follows_better(self) -> bool:
@@ -412,9 +422,9 @@ class Localiser:
         if not better:
             return False
         # With it those that look alike, wherever they are.
-        alike = [each for each in candidates if each[1].fit >= max(better) - p.alike / 2]
+        alike = [each for each in candidates if each[1].fit >= max(better) - p.better / 2]
         known = [rival.pose for rival in self._rivals]
-        for pose, explained in alike[: p.most_rivals]:
+        for pose, explained in alike[:MOST]:
             if not any(self._same(pose, other) for other in known):
                 known.append(pose)
                 self._rivals.append(_Rival(pose, (explained.fit - agreement) / 3, is_equal=False))
@@ -425,8 +435,7 @@ class Localiser:
         self.lost = False
         self._look_at = None
         self._rounds = 0
-        p = self.parameters
-        rate = p.usual_rise if agreement > self._usual else p.usual_fall
+        rate = _USUAL_RISE if agreement > self._usual else _USUAL_FALL
         if self._tolerated < 1.0:
             # A search found nothing better: it is what the place is like.
             rate = 0.2
@@ -437,10 +446,10 @@ class Localiser:
         p = self.parameters
         taken: list[Pose] = [candidates[0][0]]
         for pose, explained in candidates[1:]:
-            good = explained.hit >= max(candidates[0][1].hit - p.alike, p.lost_below)
+            good = explained.hit >= max(candidates[0][1].hit - p.better, p.lost_below)
             if good and not any(self._same(pose, other) for other in taken):
                 taken.append(pose)
-        return [_Rival(pose) for pose in taken[1 : p.most_rivals + 1]]
+        return [_Rival(pose) for pose in taken[1 : MOST + 1]]
 
     def search(self, scan: Scan) -> list[tuple[Pose, Evidence]]:
         """Return poses anywhere that explain a scan, and its evidence; the likeliest first."""
