@@ -48,7 +48,7 @@ from surveillance_runtime.run_parameters import (
     write_parameters,
 )
 from surveillance_runtime.rviz_layout import fleet_layout
-from surveillance_runtime.stop_request import StopFile, own_file
+from surveillance_runtime.stop_request import own_stop
 
 STOP_KEEPER = 'motion_controller'
 """Who reads the stop that is kept, besides the collision monitor."""
@@ -176,10 +176,10 @@ def stopped_ones(run: Run, team: Sequence[RobotProcesses], environ: Mapping[str,
     for part in team:
         if all(node.name != STOP_KEEPER for node in part.everyone):
             continue
-        kept = own_file(int(ros_domain(run)), part.run.namespace or '/', environ)
-        if (request := StopFile(kept).read()) is not None:
+        kept = own_stop(int(ros_domain(run)), part.run.namespace or '/', environ)
+        if (request := kept.read()) is not None:
             robot = part.robot or 'the robot'
-            lines[kept] = (
+            lines[kept.path] = (
                 f'{robot} is {request.words()}, not released: it stands until somebody does'
             )
     return list(lines.values())

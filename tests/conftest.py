@@ -44,6 +44,9 @@ os.environ['ROS_DOMAIN_ID'] = str(_domain)
 _STATE = Path(tempfile.mkdtemp(prefix='surveillance_state_'))
 atexit.register(shutil.rmtree, _STATE, ignore_errors=True)
 os.environ['XDG_STATE_HOME'] = str(_STATE)
+_MEMORY = _STATE / 'memory'
+_MEMORY.mkdir()
+os.environ['XDG_RUNTIME_DIR'] = str(_MEMORY)
 USER_ENVIRON = dict(os.environ)
 """What a user's shell gives to a command; tests of commands start them with it."""
 # A test machine's neighbours are no part of a test.
@@ -270,7 +273,7 @@ class Graph:
 def _released() -> Iterator[None]:
     """Let no robot of the next test be stopped by this one."""
     yield
-    for kept in _STATE.glob('surveillance/stop_*.json'):
+    for kept in _STATE.glob('**/surveillance/stop_*.json'):
         kept.unlink()
 
 

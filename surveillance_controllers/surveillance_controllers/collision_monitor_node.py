@@ -70,7 +70,7 @@ from surveillance_runtime.state_topics import (
     publishers_of,
 )
 from surveillance_runtime.stop_keeper import StopKeeper
-from surveillance_runtime.stop_request import OWN, TOPIC, StopFile, StopRequest, own_file
+from surveillance_runtime.stop_request import OWN, TOPIC, StopFile, StopRequest, own_stop
 
 STOP_CAUSE = ('person', 'stop')
 MANUAL, MANUAL_SECONDS = 'cmd_vel_manual', 0.5
@@ -180,7 +180,7 @@ class CollisionMonitor(PatrolNode):
         self._lidars: dict[str, list[str]] = {}
         self._is_held_back = False
         self._manual_until = -math.inf
-        files = [StopFile(each) for each in self._kept_in(self._settings.state_file)]
+        files = self._kept_in(self._settings.state_file)
         self._keeper = StopKeeper(self, *files)
         self._stop = next(filter(None, (each.read() for each in files)), None)
         self._stopped_topic = OwnedTopic(self, Bool, STOPPED)
@@ -215,12 +215,12 @@ class CollisionMonitor(PatrolNode):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK_PERIOD, self._look_for_others, clock=steady)
 
-    def _kept_in(self, name: str) -> list[Path | None]:
+    def _kept_in(self, name: str) -> list[StopFile]:
         """Return where a stop is kept, and where whoever drives has kept it (`Hold`)."""
-        own = own_file(self.context.get_domain_id(), self.get_namespace(), os.environ)
+        own = own_stop(self.context.get_domain_id(), self.get_namespace(), os.environ)
         if name == OWN:
             return [own]
-        return [Path(name).expanduser(), own] if name else [None]
+        return [StopFile(Path(name).expanduser()), own] if name else [StopFile(None)]
 
     def _on_manual(self, message: Twist) -> None:
         self._manual_until = time.monotonic() + MANUAL_SECONDS
@@ -293,7 +293,7 @@ class CollisionMonitor(PatrolNode):
             problem = await self._begin_stop(self._stop or StopRequest.heard('', ''))
             response.message = 'the robot is stopped'
             if problem:
-                response.message += f', but not over a restart of collision_monitor: {problem}'
+                response.message += f', but {problem}'
         elif self._stop is None:
             response.message = 'it is not stopped'
         else:

@@ -36,16 +36,15 @@ class StopKeeper:
         node.stopping.subscribe(self._disk.stop)
 
     async def keep(self, request: StopRequest) -> str:
-        """Keep a stop; return why it is not known to be kept over a restart, or ''."""
-        return await self._in_time(
-            partial(self._files[0].keep, request), 'the stop cannot be kept over a restart'
-        )
+        """Keep a stop; return what it is not known to outlive, and why, or ''."""
+        problem = await self._in_time(partial(self._files[0].keep, request), 'the stop is kept')
+        return f'not for sure over a restart: {problem}' if problem == UNANSWERED else problem
 
     async def forget(self) -> str:
         """Remove it; return why the next start may find it, or ''."""
         return await self._in_time(
             lambda: next(filter(None, [each.forget() for each in self._files]), ''),
-            'the next start finds the robot stopped',
+            'the next start finds the robot stopped:',
         )
 
     async def _in_time(self, work: Callable[[], str], otherwise: str) -> str:
@@ -57,7 +56,7 @@ class StopKeeper:
             problem = work()
             done.set()
             if problem:
-                self._node.get_logger().error(f'{otherwise}: {problem}')
+                self._node.get_logger().error(f'{otherwise} {problem}')
 
         self._disk.put(run)
         await work_aside(self._node, lambda: done.wait(ANSWER_WITHIN), 'stop waits for the disk')

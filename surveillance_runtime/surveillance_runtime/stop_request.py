@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import re
+import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -61,6 +62,15 @@ def _in_one_line(text: str) -> str:
     return ''.join(each if each.isprintable() else ' ' for each in text[:LONGEST_TEXT]).strip()
 
 
+def own_stop(domain: int, namespace: str, environ: Mapping[str, str]) -> StopFile:
+    """Return what keeps a robot's stop on this machine; see `own_file`."""
+    file = own_file(domain, namespace, environ)
+    memory = environ.get('XDG_RUNTIME_DIR') or f'/run/user/{os.getuid()}'
+    if not os.path.isdir(memory):
+        memory = os.path.join(tempfile.gettempdir(), f'surveillance_{os.getuid()}')
+    return StopFile(file, Path(memory, 'surveillance', file.name))
+
+
 def own_file(domain: int, namespace: str, environ: Mapping[str, str]) -> Path:
     """Return the file in which a robot's stop is kept on this machine.
 
@@ -81,48 +91,71 @@ class StopFile:
 
     Args:
         path: The file; None: nothing is kept.
+        spare: A file in memory, which lasts until the machine is switched off: written first, and
+            left where the other one cannot be written; None: there is none.
     """
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path | None, spare: Path | None = None) -> None:
         self.path = path
+        self.spare = None if spare == path else spare
 
     def read(self) -> StopRequest | None:
         """Return the wish that is kept; None where there is none.
 
         A file that cannot be read stops the robot as well: that it was released is not known.
         """
-        if self.path is None:
-            return None
-        try:
-            found = read_json(self.path, _LARGEST)
-            if found is None:
-                return None
-            owner, reason, since = (found[each] for each in ('owner', 'reason', 'since'))
-            if not 0.0 <= float(since) < _LATEST:
-                raise ValueError(f'since {since!r:.20}, expected a time')
-            return StopRequest(_in_one_line(str(owner)), _in_one_line(str(reason)), float(since))
-        except (FileError, KeyError, TypeError, ValueError) as error:
-            return StopRequest('', f'{self.path} cannot be read: {error}', time.time())
+        files = (self.path, self.spare)
+        return next(filter(None, (_read(each) for each in files if each is not None)), None)
 
     def keep(self, request: StopRequest) -> str:
-        """Write the wish to the disk; return why it cannot be kept, or ''."""
+        """Write the wish; return what it does not outlive, and why, or ''."""
         if self.path is None:
-            return 'no file is given for it'
+            return 'not over a restart: no file is given for it'
         content = {'owner': request.owner, 'reason': request.reason, 'since': request.since}
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(self.path, json.dumps(content).encode() + b'\n', durable=True)
-        except OSError as error:
-            return in_one_line(error)
-        return ''
+        words = json.dumps(content).encode() + b'\n'
+        in_memory = self.spare is not None and not _write(self.spare, words, durable=False)
+        problem = _write(self.path, words, durable=True)
+        if not problem:
+            if self.spare is not None:
+                _remove(self.spare)
+            return ''
+        lost = 'once the machine was off' if in_memory else 'over a restart'
+        return f'not {lost}: {problem}'
 
     def forget(self) -> str:
         """Remove the wish; return why it is still kept, or ''."""
-        if self.path is None:
-            return ''
-        try:
-            with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-                self.path.unlink()
-        except OSError as error:
-            return in_one_line(error)
-        return ''
+        files = (self.path, self.spare)
+        return next(filter(None, [_remove(each) for each in files if each is not None]), '')
+
+
+def _read(path: Path) -> StopRequest | None:
+    try:
+        found = read_json(path, _LARGEST)
+        if found is None:
+            return None
+        owner, reason, since = (found[each] for each in ('owner', 'reason', 'since'))
+        if not 0.0 <= float(since) < _LATEST:
+            raise ValueError(f'since {since!r:.20}, expected a time')
+        return StopRequest(_in_one_line(str(owner)), _in_one_line(str(reason)), float(since))
+    except (FileError, KeyError, TypeError, ValueError) as error:
+        return StopRequest('', f'{path} cannot be read: {error}', time.time())
+
+
+def _write(path: Path, words: bytes, *, durable: bool) -> str:
+    """Write a file; return why that failed, or ''."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, words, durable=durable)
+    except OSError as error:
+        return in_one_line(error)
+    return ''
+
+
+def _remove(path: Path) -> str:
+    """Remove a file; return why it is still there, or ''."""
+    try:
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            path.unlink()
+    except OSError as error:
+        return in_one_line(error)
+    return ''

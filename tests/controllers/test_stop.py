@@ -106,7 +106,7 @@ def test_a_stop_that_cannot_be_kept_says_so_and_outlives_the_monitor_in_who_driv
     monitor = graph.add(CollisionMonitor, kept)
     hold = Hold(graph.add(PatrolNode, name='motion_controller'))
     said = press(graph, True)
-    assert said.startswith('the robot is stopped, but not over a restart of collision_monitor: ')
+    assert said.startswith('the robot is stopped, but not over a restart: ')
     graph.until(lambda: hold.active)
     graph.remove(monitor)
     monitor = graph.add(CollisionMonitor, kept)
@@ -178,7 +178,7 @@ def test_while_the_disk_hangs_the_monitor_goes_on(
     graph.until(lambda: joystick.speed() == 0.5)
     try:
         said = press(graph, True)
-        assert said.startswith('the robot is stopped, but not over a restart of collision_monitor')
+        assert said.startswith('the robot is stopped, but not for sure over a restart')
         assert 'the disk has not answered' in said
         assert asked.is_set()
         graph.until(lambda: joystick.speed() == 0.0)

@@ -55,7 +55,7 @@ def test_the_hint_to_watch_leads_to_this_run(monkeypatch):
 
 def test_a_robot_that_was_stopped_is_named_at_the_start(tmp_path):
     team = [RobotProcesses(run=Run(domain=7), nodes=(), observers=(BY_NAME['motion_controller'],))]
-    environ = {'XDG_STATE_HOME': str(tmp_path)}
+    environ = {'XDG_STATE_HOME': str(tmp_path), 'XDG_RUNTIME_DIR': str(tmp_path / 'none')}
     assert stopped_ones(Run(domain=7), team, environ) == []
     StopFile(own_file(7, '/', environ)).keep(StopRequest('the guard', '', 1.7e9))
     (line,) = stopped_ones(Run(domain=7), team, environ)

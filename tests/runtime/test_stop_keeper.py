@@ -58,7 +58,7 @@ def test_a_disk_that_hangs_is_told_in_time_and_keeps_the_order(
     file = StopFile(tmp_path / 'stop')
     answers = Answers(graph, file)
     try:
-        assert answers.of('keep', WISH) == UNANSWERED
+        assert answers.of('keep', WISH).endswith(UNANSWERED)
         assert answers.of('forget') == UNANSWERED
     finally:
         goes_on.set()

@@ -8,7 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from surveillance_runtime.stop_request import LONGEST_TEXT, StopFile, StopRequest, own_file
+from surveillance_runtime.stop_request import (
+    LONGEST_TEXT,
+    StopFile,
+    StopRequest,
+    own_file,
+    own_stop,
+)
 
 pytestmark = pytest.mark.unit
 
@@ -120,3 +126,37 @@ def test_what_is_kept_is_readable_by_other_software(file: StopFile) -> None:
         'reason': 'a child',
         'since': 1_767_222_000.0,
     }
+
+
+def test_a_full_disk_leaves_the_stop_in_memory_until_the_machine_is_off(tmp_path: Path) -> None:
+    (tmp_path / 'full').write_text('')
+    spare = tmp_path / 'memory' / 'stop.json'
+    file = StopFile(tmp_path / 'full' / 'stop.json', spare)
+    assert file.keep(WISH).startswith('not once the machine was off: ')
+    assert StopFile(tmp_path / 'full' / 'stop.json', spare).read() == WISH
+    (tmp_path / 'full').unlink()
+    assert file.keep(WISH) == ''
+    assert not spare.exists()
+    assert file.read() == WISH
+    spare.write_text('{}')
+    assert file.forget() == ''
+    assert file.read() is None
+
+
+def test_a_disk_that_hangs_is_asked_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = []
+    monkeypatch.setattr(
+        'surveillance_runtime.stop_request.replace_file',
+        lambda path, _words, *, durable: written.append((path.name, durable)),
+    )
+    StopFile(tmp_path / 'a', tmp_path / 'b').keep(WISH)
+    assert written == [('b', False), ('a', True)]
+
+
+def test_memory_is_the_user_s(tmp_path: Path) -> None:
+    state = {'XDG_STATE_HOME': str(tmp_path / 'state'), 'XDG_RUNTIME_DIR': str(tmp_path)}
+    kept = own_stop(3, '/a', state)
+    assert kept.path == own_file(3, '/a', state)
+    assert kept.spare == tmp_path / 'surveillance' / 'stop_3_a.json'
+    elsewhere = own_stop(3, '/a', {**state, 'XDG_RUNTIME_DIR': str(tmp_path / 'none')})
+    assert elsewhere.spare is not None

@@ -26,7 +26,7 @@ from surveillance_interfaces.msg import StopRequest as StopRequestMessage
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.stop_keeper import StopKeeper
-from surveillance_runtime.stop_request import TOPIC, StopFile, StopRequest, own_file
+from surveillance_runtime.stop_request import TOPIC, StopRequest, own_stop
 
 STOPPED = 'stopped'
 """Topic of `collision_monitor`: a person has stopped the robot."""
@@ -65,8 +65,8 @@ class Hold:
         self._reasons: set[str] = set()
         self._wish = StopRequestMessage()
         self._taken_by: bytes | None = None
-        own = own_file(node.context.get_domain_id(), node.get_namespace(), os.environ)
-        self._keeper = StopKeeper(node, StopFile(own))
+        own = own_stop(node.context.get_domain_id(), node.get_namespace(), os.environ)
+        self._keeper = StopKeeper(node, own)
         self._kept = False
         self.begun, self.ended = Interrupt(), Interrupt()
         self.ended.set()
@@ -143,10 +143,11 @@ class Hold:
             was_kept = self._kept
             self._release()
             problem = await self._keeper.forget() if was_kept else ''
+            problem = problem and f'the next start may find it stopped: {problem}'
         response.success = True
         response.message = 'the robot stands' if self.active else 'the robot may move again'
         if problem:
-            response.message += f', but a restart may find it otherwise: {problem}'
+            response.message += f', but {problem}'
         return response
 
     async def _keep(self) -> str:
