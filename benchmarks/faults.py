@@ -408,7 +408,7 @@ WAYS: tuple[tuple[str, ...], ...] = (
     ('--record', 'OTHER'),
     ('--record', 'off'),
     ('--without', 'battery_controller'),
-    ('--stage', ''),
+    ('--memory', '4096'),
     ('--log-level', 'warn'),
 )
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL)
