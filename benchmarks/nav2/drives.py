@@ -186,15 +186,15 @@ future = client.call_async(request)
 rclpy.spin_until_future_complete(node, future, timeout_sec=20.0)
 """
 SEND_GOAL = """
-from nav2_msgs.action import NavigateToPose
+from geometry_msgs.msg import PoseStamped
+from nav2_msgs.action import NavigateThroughPoses
 from rclpy.action import ActionClient
-client = ActionClient(node, NavigateToPose, '/navigate_to_pose')
+client = ActionClient(node, NavigateThroughPoses, '/navigate_through_poses')
 client.wait_for_server(10.0)
-goal = NavigateToPose.Goal()
-goal.pose.header.frame_id = 'map'
-goal.pose.pose.position.x, goal.pose.pose.position.y = 10.0, 8.0
-goal.pose.pose.orientation.w = 1.0
-future = client.send_goal_async(goal)
+pose = PoseStamped()
+pose.header.frame_id = 'map'
+pose.pose.position.x, pose.pose.position.y, pose.pose.orientation.w = 10.0, 8.0, 1.0
+future = client.send_goal_async(NavigateThroughPoses.Goal(poses=[pose, pose]))
 rclpy.spin_until_future_complete(node, future, timeout_sec=20.0)
 if future.done() and future.result().accepted:
     rclpy.spin_until_future_complete(node, future.result().get_result_async(), timeout_sec=30.0)
