@@ -23,6 +23,7 @@ from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.check_up import (
     BASE_FRAMES,
+    NAMELESS,
     Endpoint,
     ExpectedTopic,
     GraphSample,
@@ -65,8 +66,7 @@ def _endpoint(info: Any) -> Endpoint:
     quality = info.qos_profile
     name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
     return Endpoint(
-        # The graph knows endpoints before it knows whose they are.
-        'a node whose name is not known yet' if '_UNKNOWN_' in name else name,
+        NAMELESS if '_UNKNOWN_' in name else name,
         info.topic_type.replace('/msg/', '/'),
         quality.reliability == ReliabilityPolicy.RELIABLE,
         quality.durability == DurabilityPolicy.TRANSIENT_LOCAL,

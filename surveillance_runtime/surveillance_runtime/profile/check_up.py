@@ -14,6 +14,8 @@ from typing import Any
 from strict_files.suggestions import like
 from surveillance_runtime.profile.record import RobotProfile
 
+NAMELESS = 'a node whose name is not known yet'
+"""The graph knows an endpoint before, and sometimes after, it knows whose it is."""
 MOST_AGE = 2.0
 """A stamp that is older or younger than this beside this machine's clock is told, seconds."""
 BASE_FRAMES = ('base_link', 'base_footprint', '')

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from surveillance_runtime.profile.check_up import (
+    NAMELESS,
     OWN_NODES,
     Endpoint,
     GraphSample,
@@ -153,7 +154,7 @@ def _of_rivals(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
     streams = [topics.odom, topics.map, *topics.scans]
     streams += [topics.battery] if profile.battery.source == 'topic' else []
     for topic in (named(each, namespace) for each in streams):
-        nodes = sorted({end.node for end in _publishers(seen, topic)})
+        nodes = sorted({end.node for end in _publishers(seen, topic)} - {NAMELESS})
         if len(nodes) > 1:
             yield Doubt(
                 f'{topic}: published by {" and ".join(nodes)}: expected one; what both say is '
