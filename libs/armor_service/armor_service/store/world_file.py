@@ -28,16 +28,15 @@ from armor_service.changes import AddAxiom, Change, RemoveAxiom, SetAssertion, a
 from armor_service.protocol import StoreError
 from armor_service.quarantine import Quarantine, Told, TooHardError
 from armor_service.reference import Buffering, Effort, Origin, Reference, knowledge_base
+from armor_service.store.assigned_numbers import assigned_numbers
 from armor_service.store.lock_holder import lock_holder
 from armor_service.store.records import TO_JSON, decode, encode, told_as_json, told_of
 from armor_service.store.salvage import salvage
 from armor_service.store.spill import Spill
 from armor_service.store.world_ontology import AxiomsRead, Quad, WorldNames, WorldOntology
 from owl_reasoner.notifier import Changes
-from owl_reasoner.owl.axioms import Axiom, DataPropertyAssertion
+from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.entities import entities_of, renamed
-from owl_reasoner.owl.expressions import Literal
-from owl_reasoner.owl.vocabulary import XSD
 
 INFERRED = 'http://inferrences/'
 """owlready2's ontology of what a reasoner found (spelled so)."""
@@ -73,18 +72,6 @@ CREATE TABLE IF NOT EXISTS armor_changes
     (id INTEGER PRIMARY KEY, event INTEGER, c INTEGER, s INTEGER, p INTEGER, o BLOB, d BLOB);
 INSERT INTO armor_own SELECT 0 WHERE NOT EXISTS (SELECT 1 FROM armor_own);
 """
-_WRITTEN_AS = {
-    XSD + 'integer': {
-        XSD + name
-        for name in (
-            *('long', 'int', 'short', 'byte', 'unsignedLong', 'unsignedInt', 'unsignedShort'),
-            *('unsignedByte', 'nonNegativeInteger', 'positiveInteger', 'nonPositiveInteger'),
-            'negativeInteger',
-        )
-    },
-    XSD + 'decimal': {XSD + 'double', XSD + 'float'},
-}
-"""The types that owlready2 writes numbers with, and those of which it does so as well."""
 _GONE, _COME, _RENAMED, _FORGOTTEN = range(4)
 """Events of `armor_changes`."""
 
@@ -782,31 +769,12 @@ class WorldFile:
                 )
 
     def _replacing(self, found: AxiomsRead) -> list[SetAssertion]:
-        """Take the numbers out of what was read that take the place of one of another type.
-
-        owlready2 writes every whole number as xsd:integer and every other one as xsd:decimal, and
-        removes them so, too: a value of xsd:long that is assigned anew stays. One number that comes
-        where there is one of a type that owlready2 does not write is taken for such an assignment,
-        and gets that type.
-        """
-        gone = {(a.subject, a.prop) for a in found.removed if isinstance(a, DataPropertyAssertion)}
-        come: dict[tuple[str, str], list[DataPropertyAssertion]] = {}
-        for axiom in found.added:
-            if isinstance(axiom, DataPropertyAssertion) and axiom.literal.datatype in _WRITTEN_AS:
-                come.setdefault((axiom.subject, axiom.prop), []).append(axiom)
+        """Take the numbers out of what was read that take the place of others."""
         replacing: list[SetAssertion] = []
-        for (subject, prop), new in come.items():
-            old = list(self.ref.kb.asserted_values(prop, subject))
-            types = _WRITTEN_AS[new[0].literal.datatype]
-            if (
-                len(new) == len(old) == 1
-                and old[0].datatype in types
-                and (subject, prop) not in gone
-            ):
-                typed = Literal(new[0].literal.lexical, old[0].datatype)
-                replacing.append(SetAssertion(DataPropertyAssertion(prop, subject, typed)))
-                found.added.remove(new[0])
-                self._net[new[0]] = -1
+        for axiom, typed in list(assigned_numbers(self.ref.kb, found.added, found.removed)):
+            replacing.append(SetAssertion(typed))
+            found.added.remove(axiom)
+            self._net[axiom] = -1
         return replacing
 
     def _renamed(self, ontology: WorldOntology, names: list[tuple[int, str]]) -> list[Change]:
