@@ -259,13 +259,13 @@ def check_passable(plan: FloorPlan, radius: float) -> None:
                 f'{_what_bars(plan)} stands in it: expected {door.width:g} m free',
             )
     start = piece_at(*plan.start[:2])
-    for room, (x, y, _) in plan.place.positions.items():
-        if piece_at(x, y) != start:
-            raise PlaceError(
-                ('room_positions', room),
-                f'a robot of {2 * radius:g} m cannot drive there from {plan.place.start}: '
-                f'expected no {_what_bars(plan)[2:]} in the way',
-            )
+    cut_off = [room for room, (x, y, _) in plan.place.positions.items() if piece_at(x, y) != start]
+    if cut_off:
+        raise PlaceError(
+            ('room_positions', cut_off[0]),
+            f'a robot of {2 * radius:g} m cannot drive from {plan.place.start} to '
+            f'{", ".join(cut_off)}: expected no {_what_bars(plan)[2:]} in the way',
+        )
 
 
 def _what_bars(plan: FloorPlan) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
 import shutil
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -182,6 +184,66 @@ def test_what_somebody_else_wrote_is_not_overwritten(typed: PlaceEditor) -> None
     plan = read_place(typed.path).plan
     assert plan.markers['M1'].id == 7
     assert set(plan.place.doors['D8']) == {'R1', 'R2'}
+
+
+@pytest.mark.parametrize('turn', range(5))
+def test_of_two_saves_at_once_one_is_refused(tmp_path: Path, turn: int) -> None:
+    path = tmp_path / 'place.yaml'
+    path.write_text(SEVEN.read_text())
+    editors = [PlaceEditor(path), PlaceEditor(path)]
+    for number, each in enumerate(editors):
+        each.apply('set_rule', {'room': 'R1', 'key': 'thresholds', 'value': 600 + number})
+    ready, said = threading.Barrier(2), {}
+
+    def save(number: int) -> None:
+        ready.wait(60.0)
+        try:
+            said[number] = editors[number].save()
+        except FileError as error:
+            said[number] = str(error)
+
+    threads = [threading.Thread(target=save, args=(number,)) for number in range(2)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    (winner,) = [number for number, text in said.items() if text.startswith('written')]
+    assert 'changed by somebody else' in said[1 - winner]
+    assert f'R1: {600 + winner}' in path.read_text()
+
+
+@pytest.mark.parametrize('mark', [b'', codecs.BOM_UTF8])
+@pytest.mark.parametrize('line_end', ['\n', '\r\n'])
+def test_a_file_stays_as_it_was_but_for_the_change(
+    tmp_path: Path, mark: bytes, line_end: str
+) -> None:
+    path = tmp_path / 'place.yaml'
+    before = mark + SEVEN.read_text().replace('\n', line_end).encode()
+    path.write_bytes(before)
+    path.chmod(0o640)
+    editor = PlaceEditor(path)
+    editor.apply('set_rule', {'room': 'R1', 'key': 'thresholds', 'value': 600})
+    editor.save()
+    after = path.read_bytes()
+    lines = after.decode('utf-8-sig').split(line_end)
+    assert after.startswith(mark)
+    assert set(before.decode('utf-8-sig').split(line_end)) <= set(lines)
+    assert any('R1: 600' in line for line in lines)
+    assert after.count(b'\r') == (after.count(b'\n') if line_end == '\r\n' else 0)
+    assert path.stat().st_mode & 0o777 == 0o640
+    editor.undo()
+    editor.save()
+    assert path.read_bytes() == before
+
+
+def test_a_zone_over_the_only_way_names_what_falls_apart(typed: PlaceEditor) -> None:
+    corners = [[8.0, 6.6], [8.6, 6.6], [8.6, 9.9], [8.0, 9.9]]
+    typed.apply('set_zone', {'kind': 'keep_out', 'corners': corners})
+    across = [[x + 3.2, y] for x, y in corners]
+    assert typed.problem_with('set_zone', {'kind': 'keep_out', 'corners': across}) == (
+        'room_positions.R1: a robot of 0.44 m cannot drive from E to R1, C1: expected no wall or '
+        'a keep-out zone in the way'
+    )
 
 
 def test_the_part_with_the_station_is_where_the_robot_charges(scanned: PlaceEditor) -> None:

@@ -6,13 +6,15 @@ A pipe or a device may have no end, and to replace one takes it away from everyb
 from __future__ import annotations
 
 import errno
+import fcntl
 import glob
 import json
 import os
 import secrets
 import stat
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +85,8 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
     """Write a file so that whoever reads it finds all of the old content or all of the new one.
 
     Args:
-        path: The file, or a link to it, which stays, with its rights; its folder is there.
+        path: The file, or a link to it, which stays, with its rights, and its owner where who
+            writes may give it one; its folder is there.
         data: What it is to hold.
         durable: On return it is on the disk, and outlives a failure of power.
 
@@ -91,8 +94,8 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
         OSError: It cannot be written, or is none; the error has its name, and the old one is whole.
     """
     target = file_to_write(path)
-    mode = target.stat().st_mode if target.exists() else None
-    if mode is not None and not os.access(target, os.W_OK, effective_ids=True):
+    before = target.stat() if target.exists() else None
+    if before is not None and not os.access(target, os.W_OK, effective_ids=True):
         # Its folder would let it be replaced all the same.
         raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(path))
     _remove_abandoned(target)
@@ -101,9 +104,8 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
         # Not by tempfile: to give its file the usual rights, all threads' umask would change.
         handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
         with open(handle, 'wb') as file:
-            if mode is not None:
-                with suppress(OSError):  # There are file systems without rights.
-                    os.fchmod(handle, stat.S_IMODE(mode))
+            if before is not None:
+                _take_rights(handle, before)
             file.write(data)
             file.flush()
             if durable:
@@ -117,6 +119,35 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
     if durable:
         with suppress(OSError):
             _sync_folder(target.parent)
+
+
+def _take_rights(handle: int, before: os.stat_result) -> None:
+    """Give a new file the owner, group and rights of the one that it replaces."""
+    own = os.fstat(handle)
+    # Each for itself: whoever may not give a file away may give it to a group.
+    for user, group in ((before.st_uid, -1), (-1, before.st_gid)):
+        if (user, group) not in ((own.st_uid, -1), (-1, own.st_gid)):
+            with suppress(OSError):
+                os.fchown(handle, user, group)
+    with suppress(OSError):  # There are file systems without rights.
+        os.fchmod(handle, stat.S_IMODE(before.st_mode))
+
+
+@contextmanager
+def alone_in(folder: str | Path) -> Iterator[None]:
+    """Wait until nobody else works in a folder, and keep others out (flock; nothing is left there).
+
+    It keeps out those who do the same.
+
+    Raises:
+        OSError: The folder cannot be opened.
+    """
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _remove_abandoned(target: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import copy
 import inspect
 from collections.abc import Callable, Mapping
@@ -21,8 +22,10 @@ from floor_plans.patrol_rules import PatrolRules, patrol_rules
 from floor_plans.room_map import ROBOT_RADIUS, FloorPart, RoomMap, check_passable
 from floor_plans.rooms import Place, PlaceError
 from floor_plans.writing import updated_text
-from strict_files.files import FileError, in_one_line, replace_text
+from strict_files.files import FileError, in_one_line, read_file
+from strict_files.regular_files import alone_in, replace_file
 from strict_files.suggestions import nearest
+from strict_files.yaml_file import MAX_BYTES
 
 MOST_UNDONE = 200
 """Changes that are kept to be undone."""
@@ -103,11 +106,10 @@ class PlaceEditor:
         self._open()
 
     def _open(self) -> None:
-        try:
-            self._text = self.path.read_text('utf-8')
-        except OSError as error:
-            raise FileError(in_one_line(error)) from None
+        # First: what somebody writes meanwhile must not look as if it had been read.
+        self._written = self._read()
         file, described = described_in(self.path)
+        self._text, self._form = _plain_text(self._written)
         self._map = None
         try:
             first = self._moment(described, {}, '')
@@ -116,6 +118,9 @@ class PlaceEditor:
         self._map = first.plan.map
         self._history = [first]
         self._at = self._saved = 0
+
+    def _read(self) -> bytes:
+        return read_file(self.path, MAX_BYTES)
 
     @property
     def now(self) -> Moment:
@@ -205,17 +210,20 @@ class PlaceEditor:
         Raises:
             FileError: It cannot be written, or somebody else has changed it.
         """
+        text = self.text()
+        data = self._form.encoded(text)
         try:
-            if self.path.read_text('utf-8') != self._text:
-                raise FileError(
-                    f'{self.path}: changed by somebody else since it was opened: expected it as it '
-                    'was; open it anew'
-                )
-            text = self.text()
-            replace_text(self.path, text)
+            # Another editor compares and writes in its turn.
+            with alone_in(self.path.resolve().parent):
+                if self._read() != self._written:
+                    raise FileError(
+                        f'{self.path}: changed by somebody else since it was opened: expected it '
+                        'as it was; open it anew'
+                    )
+                replace_file(self.path, data)
         except OSError as error:
             raise FileError(in_one_line(error)) from None
-        self._text = text
+        self._text, self._written = text, data
         # From now on the file has the names of this moment.
         written = self.now.renamed
         self._history = [
@@ -267,6 +275,30 @@ class PlaceEditor:
         rules = patrol_rules(whole, plan.place.rooms)
         self._more_checks(plan.place)
         return Moment(described, renamed, plan, regions, rules, said)
+
+
+@dataclass(frozen=True)
+class _TextForm:
+    """How a file writes its text, which stays as it is.
+
+    Attributes:
+        mark: What it begins with, a byte order mark or nothing.
+        line_end: How its lines end.
+    """
+
+    mark: bytes
+    line_end: str
+
+    def encoded(self, text: str) -> bytes:
+        return self.mark + text.replace('\n', self.line_end).encode('utf-8')
+
+
+def _plain_text(data: bytes) -> tuple[str, _TextForm]:
+    """Return a file's text with the line ends of this system, and how the file writes it."""
+    mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b''
+    text = data[len(mark) :].decode('utf-8')
+    line_end = '\r\n' if '\r\n' in text else '\n'
+    return text.replace('\r\n', '\n'), _TextForm(mark, line_end)
 
 
 def _renamed_since(
