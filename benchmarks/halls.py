@@ -108,7 +108,7 @@ class Patrol:
 def patrol(map_file: Path, threshold: float, seconds: float, folder: Path) -> Patrol:
     """Patrol a map for a while of simulated time after the first sweep."""
     place, record = folder / 'place.yaml', folder / 'events.jsonl'
-    print(import_place(ImportRequest(map_file, place, force=True)).lines[0], flush=True)
+    import_place(ImportRequest(map_file, place, force=True))
     building = read_map(map_file)
     grid = building.grid
     free = grid.free
@@ -178,19 +178,18 @@ def main() -> int:
         if options.map is not None and options.size is not Size.SMOKE:
             (folder / 'other').mkdir()
             chosen = [(options.map.stem, options.map, options.threshold)]
-        rows = []
+        print(
+            f'{"building":12} {"floor m2":>8} {"threshold s":>11} {"sweep s":>8} {"sweeps":>6} '
+            f'{"seen, mean":>10} {"least":>7} {"standing":>8}'
+        )
         for each, map_file, threshold in chosen:
             own = folder / (each if options.map is None else 'other')
-            rows.append((each, threshold, patrol(map_file, threshold, seconds * threshold, own)))
-    print(
-        f'{"building":12} {"floor m2":>8} {"threshold s":>11} {"sweep s":>8} {"sweeps":>6} '
-        f'{"seen, mean":>10} {"least":>7} {"standing":>8}'
-    )
-    for each, threshold, found in rows:
-        print(
-            f'{each:12} {found.floor:8.0f} {threshold:11.0f} {found.sweep:8.0f} '
-            f'{found.visits:6} {found.mean:10.1%} {found.least:7.1%} {found.standing:8.1%}'
-        )
+            found = patrol(map_file, threshold, seconds * threshold, own)
+            print(
+                f'{each:12} {found.floor:8.0f} {threshold:11.0f} {found.sweep:8.0f} '
+                f'{found.visits:6} {found.mean:10.1%} {found.least:7.1%} {found.standing:8.1%}',
+                flush=True,
+            )
     return 0
 
 

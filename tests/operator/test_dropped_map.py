@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -197,3 +199,23 @@ def test_a_place_that_cannot_be_written_whole_leaves_nothing(tmp_path: Path) -> 
         import_dropped(files, here, 0.22)
     assert list(here.iterdir()) == []
     import_dropped(files, here, 0.22)
+
+
+def test_a_photo_of_a_plan_becomes_a_place(tmp_path: Path) -> None:
+    image = np.full((500, 700, 3), 245, np.uint8)
+    for start, end in (
+        *(((50, 50), (650, 70)), ((50, 430), (650, 450)), ((50, 50), (70, 450))),
+        *(((630, 50), (650, 450)), ((340, 50), (360, 200)), ((340, 290), (360, 450))),
+    ):
+        cv2.rectangle(image, start, end, (10, 10, 10), -1)
+    _, data = cv2.imencode('.png', image)
+    files = {'plan.png': base64.b64encode(data.tobytes()).decode()}
+    with pytest.raises(ValueError, match='says nothing of its scale'):
+        import_dropped(files, tmp_path, 0.22)
+    place, said = import_dropped(files, tmp_path, 0.22, '', '', '', '50,60 650,60 6')
+    assert said.startswith('plan.png: 2 rooms, 1 door')
+    assert {each.name for each in tmp_path.iterdir()} == {
+        *('plan.png', 'plan_place.yaml', 'plan_place.png'),
+        *('plan_place_map.yaml', 'plan_place_map.png'),
+    }
+    assert len(read_place(place).place.rooms) == 2

@@ -17,7 +17,7 @@ from typing import Any
 
 import yaml
 
-from floor_plans.imports import SUFFIXES, ImportRequest, import_place, is_levels
+from floor_plans.imports import SUFFIXES, ImportRequest, PlanPhoto, import_place, is_levels
 from floor_plans.occupancy_map import PICTURES
 from strict_files.files import FileError, in_one_line
 from strict_files.yaml_file import read_yaml_file
@@ -29,7 +29,13 @@ _NAME = re.compile(r'[^\W_][\w .()-]{0,99}')
 
 
 def import_dropped(
-    files: Mapping[str, Any], folder: Path, radius: float, resolution: str = '', level: str = ''
+    files: Mapping[str, Any],
+    folder: Path,
+    radius: float,
+    resolution: str = '',
+    level: str = '',
+    corners: str = '',
+    scale: str = '',
 ) -> tuple[Path, str]:
     """Make a place of files; return it, and what was found in one line.
 
@@ -40,6 +46,7 @@ def import_dropped(
         radius: Of the robot, metres.
         resolution: Side of a picture's pixel, metres; empty: not given.
         level: The level of a building that has several; empty: not given.
+        corners, scale: How a picture shows a plan, see `PlanPhoto.from_words`; empty: it is a map.
 
     Raises:
         ValueError: They are none of these, or something of that name is there; one line.
@@ -48,13 +55,19 @@ def import_dropped(
     if sum(map(len, contents.values())) > MOST_BYTES:
         raise ValueError(f'more than {MOST_BYTES // 1_000_000} MB: expected smaller files')
     source = _source(contents)
+    photo = PlanPhoto.from_words(corners, scale) if scale.strip() else None
     with tempfile.TemporaryDirectory(prefix='dropped-') as staged:
         stage = Path(staged)
         for name, data in contents.items():
             (stage / name).write_bytes(data)
         out = stage / f'{Path(source).stem.removesuffix(".building")}_place.yaml'
         request = ImportRequest(
-            stage / source, out, radius, resolution=_side(resolution), level=level.strip()
+            stage / source,
+            out,
+            radius,
+            resolution=None if photo else _side(resolution),
+            level=level.strip(),
+            photo=photo,
         )
         try:
             if source.lower().endswith(_YAML) and not is_levels(contents[source]):

@@ -72,10 +72,8 @@ def editor_page(place: Path | None, host: str, port: int, radius: float, token: 
     def opened(path: Path) -> PlaceEditor:
         return PlaceEditor(path, radius=radius, more_checks=checked_names)
 
-    def import_map(
-        files: Mapping[str, Any], resolution: str, level: str
-    ) -> tuple[PlaceEditor, str]:
-        path, said = import_dropped(files, folder, radius, resolution, level)
+    def import_map(files: Mapping[str, Any], *said_of_them: str) -> tuple[PlaceEditor, str]:
+        path, said = import_dropped(files, folder, radius, *said_of_them)
         return opened(path), said
 
     session = EditSession(None if place is None else opened(place), import_map=import_map)

@@ -110,7 +110,12 @@ class EditSession:
             return {'ok': True, 'place': None if self._open is None else shown(self._open)}
 
     def _import(
-        self, files: Mapping[str, Any], resolution: str = '', level: str = ''
+        self,
+        files: Mapping[str, Any],
+        resolution: str = '',
+        level: str = '',
+        corners: str = '',
+        scale: str = '',
     ) -> dict[str, Any]:
         make = self._import_map
         if make is None or not isinstance(files, Mapping):
@@ -119,7 +124,7 @@ class EditSession:
         def change() -> str:
             if self._open is not None and self._open.is_changed:
                 raise ValueError('the open place is not saved: save it, or undo its changes')
-            self._open, said = make(files, str(resolution), str(level))
+            self._open, said = make(files, str(resolution), str(level), str(corners), str(scale))
             return said
 
         return self._done(change)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from floor_plans.imports.place_import import ImportRequest, import_place
+from floor_plans.imports.plan_photo import PlanPhoto
 from floor_plans.room_map import ROBOT_RADIUS
 
 EXIT_BAD_INPUT = 2
@@ -63,11 +64,33 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help='make a place of each aisle of a hall, and of each way before and behind its shelves',
     )
     parser.add_argument(
+        '--plan-scale',
+        default='',
+        metavar='TEXT',
+        help='the picture is a photo or scan of a floor plan: two of its points and how far they '
+        "are apart, in pixels and metres: '120,80 940,80 12.5'",
+    )
+    parser.add_argument(
+        '--plan-corners',
+        default='',
+        metavar='TEXT',
+        help='four corners of a rectangle of that plan, in turn, where the photo is not straight: '
+        "'10,20 900,35 890,700 15,690'",
+    )
+    parser.add_argument(
         '--json', action='store_true', help='print what was found for a program, as JSON'
     )
     parser.add_argument(
         '--force', action='store_true', help='write over a place that is there already'
     )
+
+
+def _photo(options: argparse.Namespace) -> PlanPhoto | None:
+    if options.plan_corners and not options.plan_scale:
+        raise ValueError('--plan-corners: expected --plan-scale with it')
+    if not options.plan_scale:
+        return None
+    return PlanPhoto.from_words(options.plan_corners, options.plan_scale)
 
 
 def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | None = None) -> int:
@@ -94,6 +117,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
                 force=options.force,
                 with_outside=options.with_outside,
                 aisles=options.aisles,
+                photo=_photo(options),
                 update=options.update,
                 command=f'{parser.prog} {options.map}',
             )

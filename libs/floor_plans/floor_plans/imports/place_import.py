@@ -20,6 +20,7 @@ from floor_plans.description import described_in
 from floor_plans.drawing import draw_place
 from floor_plans.facts import counted, facts
 from floor_plans.imports.graphs import SUFFIXES, read_graph
+from floor_plans.imports.plan_photo import SIDE, PlanPhoto, read_photo, walls_of_photo
 from floor_plans.imports.renewal import renewed
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import LeftOut, Proposal, propose
@@ -55,6 +56,8 @@ class ImportRequest:
         force: Whether to write over a place that is there already.
         with_outside: What is outside of the building is a room, too.
         aisles: The aisles of a hall are places of their own.
+        photo: How the picture shows a floor plan, whose walls are to be found in it; None: it is a
+            map.
         update: The place of an older map of the building, from which rooms keep their names;
             None: there is none.
         command: What a person typed, for the head of the place's file; empty: nothing.
@@ -70,6 +73,7 @@ class ImportRequest:
     force: bool = False
     with_outside: bool = False
     aisles: bool = False
+    photo: PlanPhoto | None = None
     update: Path | None = None
     command: str = ''
     kept: tuple[Path, ...] = ()
@@ -124,6 +128,10 @@ def import_place(request: ImportRequest) -> ImportReport:
         return _import_graph(request, levels or None)
     if request.level:
         raise ValueError(f'{source}: has no levels: expected no --level')
+    notes: list[str] = []
+    if request.photo is not None:
+        source = _map_of_photo(request, request.photo)
+        notes.append(f'the walls of the plan as a map: {source}')
     building = read_map(source, resolution=request.resolution).as_saved()
     proposal = _proposed(request, building, {})
     beside = os.path.relpath(building.path.resolve(), out.resolve().parent)
@@ -141,8 +149,28 @@ def import_place(request: ImportRequest) -> ImportReport:
     if request.update is not None:
         parameters, changes = _updated(request, request.update, building, proposal)
     return _written(
-        request, proposal, reference, parameters, [*building.notes, *changes, *halls], large
+        request, proposal, reference, parameters, [*notes, *building.notes, *changes, *halls], large
     )
+
+
+def _map_of_photo(request: ImportRequest, photo: PlanPhoto) -> Path:
+    """Write the walls of a photographed plan as a map beside the place; return its file."""
+    if not is_picture(request.source) or request.resolution is not None:
+        raise ValueError(
+            f'{request.source}: expected the picture of a plan, whose scale two points say '
+            '(no --resolution)'
+        )
+    drawn = request.place.with_name(f'{request.place.stem}_map.yaml')
+    for path in (drawn, drawn.with_suffix('.png')):
+        _is_free(path, request)
+    try:
+        cells = walls_of_photo(read_photo(request.source), photo)
+    except FileError:
+        raise
+    except ValueError as error:
+        raise ValueError(f'{request.source}: {error}') from None
+    write_map(drawn, cells[::-1], SIDE, (0.0, 0.0, 0.0))
+    return drawn
 
 
 def _hall_in_words(name: str, hall: Hall) -> str:

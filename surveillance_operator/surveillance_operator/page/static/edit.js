@@ -553,7 +553,7 @@ const inText = (file) => new Promise((done, fail) => {
   reader.readAsDataURL(file);
 });
 
-async function importMap(files) {
+async function importMap(files, plan = {}) {
   for (const file of files) dropped.set(file.name, file);
   if (!dropped.size) return;
   const said = $('import-said');
@@ -563,9 +563,13 @@ async function importMap(files) {
   try {
     const texts = await Promise.all([...dropped].map(async ([name, file]) => [name, await inText(file)]));
     view = chosen = null;
-    const found = await send('import_map', {files: Object.fromEntries(texts), resolution: $('scale').value, level: $('level').value});
+    const found = await send('import_map', {files: Object.fromEntries(texts), resolution: $('scale').value, level: $('level').value, ...plan});
     said.textContent = found.text ?? '';
     said.className = found.ok ? 'ok' : 'warn';
+    if (found.ok) $('photo').hidden = true;
+    // A picture without a scale may be that of a plan.
+    const [only] = dropped.size === 1 ? dropped.values() : [];
+    if (!found.ok && only && !plan.scale && /says nothing of its scale/.test(found.text)) showPhoto(only);
     // Files that belong together may come one by one.
     if (found.ok || !/expected it with/.test(found.text)) dropped.clear();
     if (!found.ok && /scale|level/.test(found.text)) for (const file of files) dropped.set(file.name, file);
@@ -579,6 +583,56 @@ async function importMap(files) {
     $('files').value = '';
   }
 }
+
+// --- a photo of a floor plan: four corners, then two points whose distance is known ---
+
+const photo = {file: null, size: [0, 0], corners: [], ends: [], straight: false};
+
+function showPhoto(file) {
+  const reader = new FileReader();
+  reader.onload = () => {
+    const image = new Image();
+    image.onload = () => {
+      Object.assign(photo, {file, size: [image.naturalWidth, image.naturalHeight], corners: [], ends: [], straight: false});
+      $('photo-view').setAttribute('viewBox', `0 0 ${photo.size.join(' ')}`);
+      $('photo-view').replaceChildren(s('image', {href: reader.result, width: photo.size[0], height: photo.size[1]}), s('g'));
+      $('photo').hidden = false;
+      drawPhoto();
+    };
+    image.src = reader.result;
+  };
+  reader.readAsDataURL(file);
+}
+
+function drawPhoto() {
+  const corners = photo.straight || photo.corners.length === 4;
+  $('photo-hint').textContent = corners
+    ? photo.ends.length < 2 ? 'Click two points whose distance you know, as far apart as you can.' : 'How many metres are these two points apart?'
+    : `Is it a photo of a floor plan? Click the four corners of a rectangle in it, in turn (${photo.corners.length} of 4), or say that it is straight.`;
+  $('photo-skip').disabled = corners || photo.corners.length > 0;
+  $('photo-now').disabled = !may || photo.ends.length < 2;
+  const r = Math.max(...photo.size) / 120;
+  const line = (each) => each.map(([x, y], i) => `${i ? 'L' : 'M'}${x} ${y}`).join('');
+  $('photo-view').lastChild.replaceChildren(
+    s('path', {d: line(photo.corners) + (photo.corners.length === 4 ? 'Z' : ''), 'stroke-width': r / 3}),
+    s('path', {d: line(photo.ends), 'stroke-width': r / 2}),
+    ...[...photo.corners, ...photo.ends].map(([cx, cy]) => s('circle', {cx, cy, r, 'stroke-width': r / 3})));
+}
+
+$('photo-view').addEventListener('click', (event) => {
+  const at = new DOMPoint(event.clientX, event.clientY).matrixTransform($('photo-view').getScreenCTM().inverse());
+  const point = [Math.round(at.x), Math.round(at.y)];
+  if (!photo.straight && photo.corners.length < 4) photo.corners.push(point);
+  else if (photo.ends.length < 2) photo.ends.push(point);
+  drawPhoto();
+});
+$('photo-skip').addEventListener('click', () => { photo.straight = true; drawPhoto(); });
+$('photo-again').addEventListener('click', () => { Object.assign(photo, {corners: [], ends: [], straight: false}); drawPhoto(); });
+$('photo-now').addEventListener('click', () => {
+  const said = (each) => each.map((point) => point.join(',')).join(' ');
+  dropped.clear();
+  importMap([photo.file], {corners: said(photo.corners), scale: `${said(photo.ends)} ${$('photo-length').value.trim() || '?'}`});
+});
 
 if (document.documentElement.dataset.imports === '1') {
   $('import-section').hidden = false;
