@@ -65,6 +65,9 @@ def main() -> None:
         viewer.until(lambda: viewer.count('.proof li'), WAIT)
         viewer.click('#why-not')
         viewer.until(lambda: viewer.text('#answer'), WAIT)
+        viewer.js('location.hash = "#/engineer"')
+        viewer.picture(folder / 'page_engineer.png', *DESK)
+        viewer.js('location.hash = "#/desk"')
         for name, size in (('phone', PHONE), ('desk', DESK)):
             for dark in (False, True):
                 file = folder / f'page_{name}{"_dark" if dark else ""}.png'

@@ -45,6 +45,7 @@ from strict_files.one_line import clean
 from strict_files.suggestions import nearest
 from strict_files.yaml_file import EntryError, read_table
 from surveillance_operator.desk.handling import kinds_of
+from surveillance_operator.notify.home_assistant import Discovery
 from surveillance_operator.notify.notification import Notification, as_base64
 from surveillance_operator.notify.outbox import Deliver, DeliveryError
 from surveillance_runtime.incidents import IncidentCall, Severity
@@ -125,6 +126,7 @@ class SinkSettings:
         secret: Token or password.
         user: Who logs in.
         topic: Of MQTT.
+        discovery: Tells Home Assistant; None: it is not told.
         sender, receivers: Of e-mail.
         pictures: blurred: what shows a person or face is blurred; sharp; none.
         takes: Of what it is told.
@@ -137,6 +139,7 @@ class SinkSettings:
     secret: Secret | None = None
     user: str = ''
     topic: str = ''
+    discovery: Discovery | None = None
     sender: str = ''
     receivers: tuple[str, ...] = ()
     pictures: str = 'blurred'
@@ -239,6 +242,9 @@ def _publish(settings: SinkSettings, notification: Notification) -> None:
         told.wait_for_publish(TIMEOUT)
         if not told.is_published():
             raise DeliveryError(refused[0] if refused else 'the broker did not take it')
+        found = () if settings.discovery is None else settings.discovery.messages(notification)
+        for topic, payload in found:
+            client.publish(topic, payload, qos=1, retain=True).wait_for_publish(TIMEOUT)
     except (OSError, ValueError, RuntimeError) as error:
         raise DeliveryError(_why(error)) from None
     finally:
@@ -377,7 +383,11 @@ def _mqtt_of(settings: SinkSettings, entry: Entry) -> SinkSettings:
     if not topic or any(each in topic for each in '+#\0'):
         raise ValueError(f"topic: got {topic!r}, expected one such as 'patrol/incidents'")
     address = address_in('mqtt', entry['mqtt'], ('mqtt', 'mqtts'))
-    return replace(_with_user(settings, entry), address=address, topic=topic)
+    wanted = entry.get('discovery')
+    if wanted not in (None, 'homeassistant'):
+        raise EntryError('discovery', f"got {wanted!r}, expected 'homeassistant'")
+    discovery = None if wanted is None else Discovery(topic)
+    return replace(_with_user(settings, entry), address=address, topic=topic, discovery=discovery)
 
 
 def _mail_of(settings: SinkSettings, entry: Entry) -> SinkSettings:
@@ -442,7 +452,7 @@ SINKS: Mapping[str, SinkKind] = {
         _post,
     ),
     'mqtt': SinkKind(
-        ('mqtt', 'topic', 'user', 'password_env', 'password_file'),
+        ('mqtt', 'topic', 'discovery', 'user', 'password_env', 'password_file'),
         'password',
         _mqtt_of,
         _publish,
