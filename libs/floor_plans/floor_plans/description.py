@@ -99,7 +99,9 @@ def described_in(path: str | Path) -> tuple[YamlFile, dict[str, Any]]:
         known = (*PLACE_KEYS, *GEOMETRY_KEYS, *PATROL_KEYS)
         for key in described:
             if key not in known:
-                raise PlaceError((key,), f'unknown parameter, expected {nearest(key, known)}')
+                raise PlaceError(
+                    tuple(key.split('.')), f'unknown parameter, expected {nearest(key, known)}'
+                )
         for key in PLACE_KEYS[:3]:
             if key not in described:
                 raise PlaceError((), f"parameter '{key}' is missing")

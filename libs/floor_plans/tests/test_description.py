@@ -33,6 +33,7 @@ GOOD = """\
         ('[2.0, 3.0]', f'[2.0, {"9" * 400}]', ':6: 9999999999'),
         ('    robot_room: A\n', '', "parameter 'robot_room' is missing"),
         ('robot_room', 'robot_rom', ':7: robot_rom: unknown parameter'),
+        ('    robot_room: A', '    robot_room: A\n    dors:\n      D1: 1', ':9: dors.D1: unknown'),
         ('/**', '/other', "expected the top-level key '/**'"),
         ('ros__parameters', 'parameters', "expected 'ros__parameters:'"),
         ('B: [D1]', 'B: [D1', 'not valid YAML'),

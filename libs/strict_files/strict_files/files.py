@@ -48,7 +48,10 @@ def like_file(path: Path) -> str:
     with contextlib.suppress(OSError):
         # A link that leads nowhere is listed, too.
         there = set(os.listdir(missing.parent)) - {missing.name}
-        if name := like(missing.name, sorted(there)):
+        # What the names have in common by their ending alone is no likeness.
+        stems = {Path(each).stem: each for each in sorted(there)}
+        stems |= {Path(each).stem: each for each in there if each.endswith(missing.suffix)}
+        if name := stems.get(like(missing.stem, list(stems))):
             likely = missing.with_name(name)
             whole = likely / path.relative_to(missing)
             return str(whole if whole.exists() else likely)

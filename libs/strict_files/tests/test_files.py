@@ -54,6 +54,8 @@ def test_a_file_is_read_up_to_a_bound(tmp_path: Path) -> None:
         ('confg/office.yaml', ", expected 'config/office.yaml'"),
         ('confg/new.yaml', ", expected 'config'"),
         ('config/Office.yml', ", expected 'config/office.yaml'"),
+        # The ending alone is no likeness.
+        ('config/nothere.yaml', ''),
         ('config/nothing-like-it', ''),
         ('config/zebra', ''),
     ],
@@ -63,7 +65,8 @@ def test_a_file_that_is_not_there_is_told_with_the_one_most_like_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path('config').mkdir()
-    Path('config/office.yaml').touch()
+    for name in ('office', 'notify'):
+        Path(f'config/{name}.yaml').touch()
     Path('config/nothing-like-it').symlink_to('nowhere')
     with pytest.raises(FileError) as refused:
         read_file(Path(given), 100)
