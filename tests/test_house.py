@@ -36,6 +36,7 @@ LARGE_CLASSES = {
     'Contexts': 'the algorithm: contexts and their queue',
     'DeskEvent': 'one row of the search, a field for each thing that logs say of an event',
     'DLClauses': 'the DL-clauses, a table each',
+    'Event': 'one record that book, file and message hold, a field for each thing that is known',
     'Engine': 'the algorithm: one loop over shared indexes',
     'Frame': 'the loop that runs a machine',
     'GridPlanner': "one field of costs over a map's cells, and the search on it",

@@ -42,7 +42,7 @@ MOST_TRACKS = 100
 
 
 @dataclass
-class Track:
+class PersonTrack:
     """One person over several pictures.
 
     Attributes:
@@ -113,7 +113,7 @@ class PersonTracks:
     """The tracks of a visit; owned by whoever calls it, one thread."""
 
     def __init__(self) -> None:
-        self._tracks: list[Track] = []
+        self._tracks: list[PersonTrack] = []
         self._next = 1
 
     def begin(self) -> None:
@@ -122,7 +122,7 @@ class PersonTracks:
 
     def take(
         self, finds: Sequence[tuple[float, Spot | None]], stamp: float, in_view: Sequence[bool] = ()
-    ) -> list[Track]:
+    ) -> list[PersonTrack]:
         """Give the finds of a picture to tracks; return those tracks, the surest first.
 
         Args:
@@ -137,7 +137,7 @@ class PersonTracks:
         for index, (confidence, spot) in enumerate(finds):
             track = given.get(index)
             if track is None:
-                track = Track(self._next, stamp, None)
+                track = PersonTrack(self._next, stamp, None)
                 self._next += 1
                 self._tracks.append(track)
             track.take(confidence, spot)
@@ -148,18 +148,20 @@ class PersonTracks:
         self._tracks = [each for each in self._tracks if each.odds > -MOST_ODDS][-MOST_TRACKS:]
         return sorted(seen, key=lambda each: -each.odds)
 
-    def tracks(self, stamp: float) -> list[Track]:
+    def tracks(self, stamp: float) -> list[PersonTrack]:
         """Return the tracks that go on, moved to a time."""
         self._tracks = [each for each in self._tracks if 0.0 <= stamp - each.stamp <= FORGOTTEN]
         for each in self._tracks:
             each.predict(stamp)
         return list(self._tracks)
 
-    def _assigned(self, tracks: Sequence[Track], spots: Sequence[Spot | None]) -> dict[int, Track]:
+    def _assigned(
+        self, tracks: Sequence[PersonTrack], spots: Sequence[Spot | None]
+    ) -> dict[int, PersonTrack]:
         """Return which find belongs to which track."""
         placed = [each for each in tracks if each.state is not None]
         here = [(index, spot) for index, spot in enumerate(spots) if spot is not None]
-        found: dict[int, Track] = {}
+        found: dict[int, PersonTrack] = {}
         if placed and here:
             costs = np.array([[each.distance(spot) for each in placed] for _, spot in here])
             rows, columns = linear_sum_assignment(np.minimum(costs, 10.0 * GATE))

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from indoor_watch.person_tracks import FORGOTTEN, PersonTracks, Track
+from indoor_watch.person_tracks import FORGOTTEN, PersonTracks, PersonTrack
 
 
 def test_who_walks_is_one_track_whose_place_and_speed_are_right() -> None:
     seed = int(np.random.default_rng().integers(10**6))
     rng, tracks = np.random.default_rng(seed), PersonTracks()
-    track = Track(0, 0.0, None)
+    track = PersonTrack(0, 0.0, None)
     for step in range(20):
         stamp = 0.5 * step
         at = 1.0 + 0.8 * stamp + rng.normal(0.0, 0.1), 2.0 + rng.normal(0.0, 0.1)
