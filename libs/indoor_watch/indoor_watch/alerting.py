@@ -39,6 +39,8 @@ class Alerting:
         warn: Called with each of them that nobody could look at again, where its rule wants that.
         store: Keeps pictures; None: nothing is kept.
         drawn: Draws what has no picture.
+        blur: Returns a picture in which people are blurred, for rules that do not want them sharp;
+            None: all are kept as they are.
         verify_seconds: An alert that is not sure waits so long for a second look.
     """
 
@@ -55,11 +57,12 @@ class Alerting:
         store: EvidenceStore | None,
         drawn: Drawn,
         verify_seconds: float,
+        blur: Callable[[Picture], Picture] | None = None,
     ) -> None:
         self.rules, self.book = tuple(rules), book
         self._local, self._robot, self._tell = local, robot, tell
         self._alert, self._warn = alert, warn
-        self._store, self._drawn = store, drawn
+        self._store, self._drawn, self._blur = store, drawn, blur
         self._verify_seconds = verify_seconds
         self._habits = Habits()
         self._by_words = {each.words(): each for each in self.rules}
@@ -85,7 +88,8 @@ class Alerting:
         seen = replace(pictured.seen, usual=self._habits.usual(pictured.seen))
         self._habits.learn(seen, visit.number)
         severity, rule = severity_of(self.rules, seen, self._local(seen.stamp))
-        evidence = self._keep(pictured, severity, visit) if severity else ''
+        is_sharp = rule is not None and rule.sharp
+        evidence = self._keep(pictured, severity, visit, is_sharp=is_sharp) if severity else ''
         seen = replace(seen, robot=self._robot, evidence=evidence, seen_from=visit.at)
         self._tell(seen)
         words = '' if rule is None else rule.words()
@@ -104,7 +108,7 @@ class Alerting:
                 self._doubts.setdefault(event.number, seen.stamp + self._verify_seconds)
                 self._unverified[event.number] = rule.unverified_level
 
-    def _keep(self, pictured: Pictured, severity: int, visit: Visit) -> str:
+    def _keep(self, pictured: Pictured, severity: int, visit: Visit, *, is_sharp: bool) -> str:
         """Keep a picture, and return its file; empty: there is none."""
         if self._store is None:
             return ''
@@ -115,6 +119,9 @@ class Alerting:
                 (picture, before), kind = drawn, 'sweep-'
         if picture is None:
             return ''
+        if self._blur is not None and not is_sharp and not kind:
+            picture = self._blur(picture)
+            before = None if before is None else self._blur(before)
         if before is not None:
             picture = side_by_side(before, picture)
         what = f'{kind}{seen.kind}-{seen.subject or seen.place}-{seen.state}'

@@ -65,6 +65,7 @@ class ChangeMonitor:
         views: How each viewpoint looks normally.
         verify_seconds: An alert that is not sure waits so long for a second look.
         others: The other robots of a fleet, which are no news; None: there are none.
+        blur: Blurs people in pictures that are kept, see `Alerting`; None: none are blurred.
 
     Attributes:
         visit: The one that goes on.
@@ -90,6 +91,7 @@ class ChangeMonitor:
         views: ReferenceViews | None = None,
         verify_seconds: float = 0.0,
         others: OtherRobots | None = None,
+        blur: Callable[[Picture], Picture] | None = None,
     ) -> None:
         self._others = others or OtherRobots(0.0)
         self._covered = covered
@@ -110,6 +112,7 @@ class ChangeMonitor:
             store=store,
             drawn=self._floor.drawn,
             verify_seconds=verify_seconds,
+            blur=blur,
         )
         self._registration = Registration()
         self._latest = math.inf

@@ -83,6 +83,19 @@ def blurred(picture: Picture, find: Find | None) -> Picture:
     return result
 
 
+def blurred_at_rest(picture: Picture) -> Picture:
+    """Return a picture as it is kept: people blurred, as far as they are found, and faces.
+
+    Args:
+        picture: Grey or BGR.
+    """
+    colour = picture
+    if picture.ndim == 2:
+        colour = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), np.uint8)
+    # It stays on the machine: where no network finds persons, their faces alone are blurred.
+    return blurred(colour, installed_finder() or (lambda _: []))
+
+
 def faces_in(picture: Picture) -> list[Box]:
     """Return where faces may be that look at the camera."""
     shrink = max(1.0, picture.shape[1] / 640.0)

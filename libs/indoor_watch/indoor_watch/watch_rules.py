@@ -61,6 +61,7 @@ KEYS = (
     'confidence',
     'unverified',
     'accepted',
+    'pictures',
 )
 BY_A_PERSON = 'by a person'
 ALWAYS = WeeklyHours.parse('daily 00:00-24:00')
@@ -85,6 +86,7 @@ class WatchRule:
         accepted: After so long, seconds, what was seen is normal, unless a person says otherwise;
             inf: a person alone says so.
         name: Of the person's choice; empty: it has none.
+        sharp: Whether people in its pictures are kept as they are; else they are blurred.
     """
 
     kind: Kind
@@ -99,6 +101,7 @@ class WatchRule:
     unverified: Level | None = None
     accepted: float = math.inf
     name: str = ''
+    sharp: bool = False
 
     @property
     def unverified_level(self) -> Level:
@@ -226,6 +229,7 @@ def rule_from(
         _confidence(entry.get('confidence', 0.6)),
         _level(entry['unverified'], 'unverified') if 'unverified' in entry else None,
         _accepted(entry.get('accepted', BY_A_PERSON)),
+        sharp=_is_sharp(entry.get('pictures', 'blurred')),
     )
 
 
@@ -291,6 +295,12 @@ def _persistence(value: Any) -> tuple[int, float]:
             raise ValueError(f'persistence: got {value!r}, expected 1 look or more')
         return int(number), 0.0
     return 1, number
+
+
+def _is_sharp(value: Any) -> bool:
+    if value not in ('blurred', 'sharp'):
+        raise ValueError(f"pictures: got {value!r}, expected 'blurred' or 'sharp'")
+    return bool(value == 'sharp')
 
 
 def _accepted(value: Any) -> float:

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -132,3 +133,32 @@ def test_a_door_that_nobody_could_look_at_again_is_told_all_the_same(tmp_path: P
     alerted.see(1.0, 0.8)
     alerted.alerting.doubts(30.0)
     assert (len(alerted.calls), len(alerted.warned)) == (1, 0)
+
+
+@pytest.mark.parametrize(('rule', 'blurs'), [({}, 1), ({'pictures': 'sharp'}, 0)])
+def test_people_in_kept_pictures_are_blurred_unless_the_rule_wants_them_sharp(
+    tmp_path: Path, rule: dict[str, str], blurs: int
+) -> None:
+    asked = []
+
+    def blur(picture: np.ndarray) -> np.ndarray:
+        asked.append(picture.shape)
+        return np.zeros_like(picture)
+
+    alerting = Alerting(
+        [rule_from({'person': 'nobody', **rule})],
+        EventBook(),
+        local=lambda stamp: datetime.fromtimestamp(stamp, UTC),
+        robot='Robot1',
+        tell=lambda _: None,
+        alert=lambda _: None,
+        store=EvidenceStore(tmp_path),
+        drawn=lambda _at, _visit: None,
+        verify_seconds=0.0,
+        blur=blur,
+    )
+    seen = Observation(Kind.PERSON, 'seen', 'R1', confidence=0.9, stamp=10.0)
+    alerting.take([Pictured(seen, np.full((40, 60, 3), 200, np.uint8))], Visit('R1', 1, 0.0))
+    assert len(asked) == blurs
+    (kept,) = tmp_path.iterdir()
+    assert (cv2.imread(str(kept)).mean() < 50) == bool(blurs)

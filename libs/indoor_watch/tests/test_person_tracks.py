@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from indoor_watch.person_tracks import FORGOTTEN, PersonTracks, PersonTrack
+from indoor_watch.person_tracks import FORGOTTEN, PersonTrack, PersonTracks
 
 
 def test_who_walks_is_one_track_whose_place_and_speed_are_right() -> None:

@@ -14,6 +14,7 @@ from indoor_watch.day_book import DayBook
 from indoor_watch.doors import Segment
 from indoor_watch.inspection_plan import InspectionPlan
 from indoor_watch.other_robots import OtherRobots
+from indoor_watch.privacy import blurred_at_rest
 from indoor_watch.ways import Ways
 from lidar_navigation import PlaceLocator
 from strict_files.files import KeptFile
@@ -84,6 +85,7 @@ class ObserverWorker:
             views=settings.views(),
             verify_seconds=settings.verify_seconds,
             others=self.others,
+            blur=blurred_at_rest,
         )
         self._kept = KeptFile(settings.state_file, 'starting without it')
         self._say(self._kept.read(self._restore))
