@@ -30,6 +30,7 @@ from surveillance_behaviour.mission import mission_log
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_runtime import event_log
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
+from surveillance_runtime.configuration import Configuration, file_layer
 from surveillance_runtime.event_log import record_in
 from surveillance_runtime.node_table import RESERVED
 from surveillance_simulation.world.textures import marker_panel
@@ -216,6 +217,8 @@ def _draw(options: argparse.Namespace) -> list[str]:
         checked_names(plan.place)
     except PlaceError as error:
         raise FileError(f'{options.place}: {error}') from None
+    # As a run does: what the file says to nodes, too.
+    Configuration((file_layer(options.place),)).check()
     for marker in plan.markers.values():
         marker_panel(plan.marker_dictionary, marker.id, 'whole')
     output: Path = options.output or Path(options.place.stem + '.png')

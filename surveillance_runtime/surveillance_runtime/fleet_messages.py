@@ -14,6 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 
 from surveillance_interfaces.msg import FleetRobot
+from surveillance_runtime.incidents import Severity
 from surveillance_runtime.message_source import SOURCE
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import NAMELESS, publishers_of
@@ -72,8 +73,38 @@ class RobotSpeakers:
         return 'a node without a name' if is_told else None
 
 
+SPEAKS_FOR = 5.0
+"""Seconds for which a publisher counts that has spoken: robots repeat their facts each second."""
+SPEAKER_CAUSE = 'robot', 'second speaker'
+
+
+class OwnVoices:
+    """Tells whether somebody else speaks as a robot, which hears itself among all others.
+
+    A node that has taken the full name of another one is believed by the fleet; the robot itself
+    hears two publishers with its own words, and knows.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[bytes, float] = {}
+
+    def hear(self, publisher: bytes, now: float) -> tuple[bytes, ...]:
+        """Return the publishers that speak as this robot; more than one: somebody poses as it.
+
+        Args:
+            publisher: Who has just spoken as this robot.
+            now: Steady time, seconds.
+        """
+        self._last[publisher] = now
+        self._last = {each: at for each, at in self._last.items() if now - at < SPEAKS_FOR}
+        return tuple(self._last)
+
+
 def hear_fleet(
-    node: PatrolNode, take: Callable[[FleetRobot], object], depth: int = FLEET_QOS.depth
+    node: PatrolNode,
+    take: Callable[[FleetRobot], object],
+    depth: int = FLEET_QOS.depth,
+    own: str = '',
 ) -> None:
     """Listen to what the robots of a fleet say of themselves.
 
@@ -81,6 +112,7 @@ def hear_fleet(
         node: A node of one robot of the fleet.
         take: Called with each message, in the executor's thread.
         depth: How many messages may wait.
+        own: The robot whose node it is: who else speaks as it is an incident; empty: of none.
     """
 
     def look() -> dict[bytes, str]:
@@ -89,11 +121,29 @@ def hear_fleet(
 
     speakers = RobotSpeakers(look, node.get_namespace().rstrip('/').rpartition('/')[0])
     told: set[tuple[str, str]] = set()
+    voices = OwnVoices()
+
+    def look_for_second(publisher: bytes) -> None:
+        found = voices.hear(publisher, time.monotonic())
+        if len(found) > 1:
+            named = look()
+            who = ', '.join(
+                f'{named.get(each) or "a node without a name"} (participant {each[:12].hex()})'
+                for each in sorted(found)
+            )
+            text = (
+                f'{len(found)} nodes speak as {own} on {FLEET_TOPIC}: {who}; one is not this robot'
+            )
+            node.incidents.begin(SPEAKER_CAUSE, text, Severity.ALARM)
+        else:
+            node.incidents.end(SPEAKER_CAUSE, f'nobody else speaks as {own}')
 
     def on_message(heard: bytes, info: dict[str, Any]) -> None:
         message = deserialize_message(heard, FleetRobot)
         who = speakers.stranger(message.robot, info.get(SOURCE, b''), time.monotonic())
         if who is None:
+            if own and message.robot == own:
+                look_for_second(info.get(SOURCE, b''))
             take(message)
         elif (who, message.robot) not in told and len(told) < MOST_TOLD:
             told.add((who, message.robot))

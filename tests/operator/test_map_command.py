@@ -225,3 +225,15 @@ def test_a_canvas_puts_metres_where_they_belong() -> None:
 def test_colours_blend() -> None:
     assert blend('#000000', '#ffffff', 0.5) == '#808080'
     assert blend('#000000', '#ffffff', 7.0) == '#ffffff'
+
+
+def test_what_a_run_refuses_is_refused_here_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / 'place.yaml'
+    text = Path(__file__).resolve().parents[2].joinpath('config', 'seven_rooms.yaml').read_text()
+    path.write_text(f'{text}\nrobot_behavior:\n  ros__parameters:\n    nothing_known: 1\n')
+    assert map_command.main([str(path), '-o', str(tmp_path / 'place.png')]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f'{path}:' in line
+    assert 'nothing_known' in line

@@ -9,6 +9,9 @@ from surveillance_runtime.fleet_messages import (
     FLEET_QOS,
     FLEET_TOPIC,
     PATIENCE,
+    SPEAKER_CAUSE,
+    SPEAKS_FOR,
+    OwnVoices,
     RobotSpeakers,
     hear_fleet,
 )
@@ -68,3 +71,34 @@ def test_a_stranger_that_speaks_for_a_robot_is_named_and_not_heard(graph: Any) -
         "fleet_robots: /other/stranger speaks for 'bert', which is not believed: "
         'expected a node in the namespace of that robot'
     ]
+
+
+def test_a_robot_names_who_has_taken_its_name(graph: Any) -> None:
+    """The fleet believes a node of the right full name; the robot hears that it is not itself."""
+    bert = graph.add(PatrolNode, name='robot_behavior', namespace='bert')
+    topic = f'/bert/{FLEET_TOPIC}'
+    taken: list[FleetRobot] = []
+    hear_fleet(bert, taken.append, own='bert')
+    own = bert.create_publisher(FleetRobot, topic, FLEET_QOS)
+
+    def speaks(*publishers: Any) -> bool:
+        for each in publishers:
+            each.publish(FleetRobot(robot='bert', place='R1'))
+        return bool(taken)
+
+    graph.until(lambda: speaks(own))
+    assert not bert.incidents.open()
+    false = graph.add(PatrolNode, name='robot_behavior', namespace='bert')
+    second = false.create_publisher(FleetRobot, topic, FLEET_QOS)
+    graph.until(lambda: speaks(own, second) and bool(bert.incidents.open()))
+    (told,) = bert.incidents.updates()
+    assert told.cause == SPEAKER_CAUSE
+    assert told.text.startswith('2 nodes speak as bert on fleet_robots: ')
+    assert told.text.count('/bert/robot_behavior (participant ') == 2
+
+
+def test_a_voice_that_is_silent_counts_no_more() -> None:
+    voices = OwnVoices()
+    assert voices.hear(b'old', 0.0) == (b'old',)
+    assert set(voices.hear(b'new', 1.0)) == {b'old', b'new'}
+    assert voices.hear(b'new', 1.0 + SPEAKS_FOR) == (b'new',)

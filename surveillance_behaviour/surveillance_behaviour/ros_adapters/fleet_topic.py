@@ -117,7 +117,7 @@ def fleet_of(node: PatrolNode, robot: str, docks: tuple[str, ...]) -> FleetKnowl
         told.clear()
         told.update(standing)
 
-    hear_fleet(node, on_message)
+    hear_fleet(node, on_message, own=robot)
     node.create_timer(REPEAT, on_period)
     return knowledge
 

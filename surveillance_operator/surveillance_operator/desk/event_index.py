@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import bisect
 import gzip
-import json
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from indoor_watch import Kind
+from strict_files.regular_files import parse_json
 from surveillance_operator.desk.handling import AlarmState, Handled, Handling, Mutes
 from surveillance_runtime.event_log import record_in, segments
 
@@ -177,7 +177,7 @@ class EventIndex:
                 if not line.startswith(_HEADS) or len(line) > LONGEST_LINE:
                     continue
                 try:
-                    entry = json.loads(line)
+                    entry = parse_json(line)
                     self._take(entry, float(entry['at']), run, robot, live)
                 except (ValueError, KeyError, TypeError, AttributeError, IndexError):
                     continue  # a stranger's line, or of another version

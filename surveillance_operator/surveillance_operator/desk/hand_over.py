@@ -10,8 +10,8 @@ from __future__ import annotations
 import csv
 import gzip
 import io
-import json
 import statistics
+import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from floor_plans.facts import counted
+from strict_files.regular_files import parse_json
 from surveillance_operator.desk.event_index import (
     ALERT,
     WARNING,
@@ -157,11 +158,11 @@ def _entries(
                         continue
                     with gzip.open(path) if path.suffix == '.gz' else open(path, 'rb') as file:
                         lines = [line for line in file if line.startswith(_READ)]
-                except (OSError, EOFError):
+                except (OSError, EOFError, zlib.error):
                     continue
                 for line in lines:
                     try:
-                        entry = json.loads(line)
+                        entry = parse_json(line)
                         if float(entry['at']) < end:
                             yield robot, entry
                     except (ValueError, KeyError, TypeError):

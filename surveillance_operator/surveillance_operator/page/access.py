@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from strict_files.one_line import clean
-from strict_files.regular_files import read_file
+from strict_files.regular_files import parse_json, read_file
 from strict_files.suggestions import nearest
 
 VIEWER, GUARD, OPERATOR = ROLES = ('viewer', 'guard', 'operator')
@@ -180,7 +180,7 @@ def _links_in(path: Path) -> tuple[Link, ...]:
     Raises:
         OSError, ValueError, KeyError, TypeError: It cannot be read.
     """
-    values = json.loads(read_file(path, _LARGEST))
+    values = parse_json(read_file(path, _LARGEST))
     links = tuple(
         Link(str(e['name']), str(e['role']), str(e['hash']), float(e['made'])) for e in values
     )
