@@ -89,6 +89,7 @@ KNOWING_ROS = {
     'surveillance_controllers.stimuli',
     'surveillance_ontology.armor_client',
     'surveillance_operator.doctor_command',
+    'surveillance_operator.motion_probe',
     'surveillance_operator.fleet_actions',
     'surveillance_operator.fleet_command',
     'surveillance_operator.fleet_subscriber',

@@ -37,7 +37,7 @@ from surveillance_runtime.profile.check_up import (
 )
 from surveillance_runtime.profile.motion_check import MotionRecord, motion_doubts
 from surveillance_runtime.profile.record import RobotProfile
-from surveillance_runtime.profile.truth_check import Doubt, amended, doubts
+from surveillance_runtime.profile.truth_check import RobotDoubt, amended, doubts
 from surveillance_runtime.run_options import BUILT_IN_ROBOT, OPTIONS
 
 _IN_CHECKOUT = Path(__file__).resolve().parents[2] / 'config'
@@ -202,7 +202,7 @@ def _of_nav2(node: Node, namespace: str, spin: Callable[[float], None]) -> dict[
     return {'states': states, 'footprint': corners}
 
 
-def _amend(path: Path, found: Sequence[Doubt], *, writes: bool) -> None:
+def _amend(path: Path, found: Sequence[RobotDoubt], *, writes: bool) -> None:
     """Write the lines into a profile of the user's, or offer it."""
     # Of two that say the same key the first: what tf_static says is exact, what scans say is not.
     lines = list({each.key: each for each in reversed(found) if each.key}.values())

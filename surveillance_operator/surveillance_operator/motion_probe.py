@@ -15,7 +15,7 @@ from sensor_msgs.msg import LaserScan
 from lidar_navigation.geometry import Mount, Pose
 from surveillance_runtime.conversions import pose_from
 from surveillance_runtime.profile.check_up import named
-from surveillance_runtime.profile.motion_check import REST, STEPS, MotionRecord, Step
+from surveillance_runtime.profile.motion_check import REST, STEPS, MotionRecord, MotionStep
 from surveillance_runtime.profile.record import RobotProfile
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing.conversions import scan_from
@@ -86,20 +86,20 @@ class MotionProbe:
                 self.record.ceased.append(time.monotonic())
                 if step.silence:
                     spin(step.silence)
-                self._command_for(Step(0.0, 0.0, 0.0), REST, spin)
+                self._command_for(MotionStep(0.0, 0.0, 0.0), REST, spin)
         finally:
-            stand = partial(self._command, Step(0.0, 0.0, 0.0))
+            stand = partial(self._command, MotionStep(0.0, 0.0, 0.0))
             for _ in range(5):
                 stand()
         return self.record
 
-    def _command_for(self, step: Step, seconds: float, spin: Callable[[float], None]) -> None:
+    def _command_for(self, step: MotionStep, seconds: float, spin: Callable[[float], None]) -> None:
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             self._command(step)
             spin(PERIOD)
 
-    def _command(self, step: Step) -> None:
+    def _command(self, step: MotionStep) -> None:
         twist = Twist()
         twist.linear.x, twist.angular.z = step.speed, step.turn
         if not self._is_stamped:

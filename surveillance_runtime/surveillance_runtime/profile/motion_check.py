@@ -14,7 +14,7 @@ from lidar_navigation import MountCheck, MountFinding
 from lidar_navigation.exploration.scan_matching import Matcher, surface_of
 from lidar_navigation.geometry import Mount, Pose, Scan, angle_between, relative
 from surveillance_runtime.profile.record import RobotProfile
-from surveillance_runtime.profile.truth_check import Doubt
+from surveillance_runtime.profile.truth_check import RobotDoubt
 
 SPEED, TURN_SPEED = 0.15, 0.5
 """The commands, m/s and rad/s: slow enough for each robot."""
@@ -35,7 +35,7 @@ _WINDOW = 0.5, 0.7
 
 
 @dataclass(frozen=True)
-class Step:
+class MotionStep:
     """One part of the motion.
 
     Attributes:
@@ -51,9 +51,9 @@ class Step:
 
 
 STEPS = (
-    Step(SPEED, 0.0, WAY / SPEED, SILENCE),
-    Step(-SPEED, 0.0, WAY / SPEED),
-    Step(0.0, TURN_SPEED, TURN / TURN_SPEED),
+    MotionStep(SPEED, 0.0, WAY / SPEED, SILENCE),
+    MotionStep(-SPEED, 0.0, WAY / SPEED),
+    MotionStep(0.0, TURN_SPEED, TURN / TURN_SPEED),
 )
 REST = 1.0
 """Between two of them the robot is commanded to stand for so long, seconds."""
@@ -87,7 +87,7 @@ class MotionRecord:
 
 def motion_doubts(
     record: MotionRecord, profile: RobotProfile, mounts: Sequence[Mount] = (Mount(),)
-) -> Iterator[Doubt]:
+) -> Iterator[RobotDoubt]:
     """Yield what a motion told, the gravest first.
 
     Args:
@@ -96,14 +96,14 @@ def motion_doubts(
         mounts: Where its lidars are believed to sit; the scans are of the first.
     """
     if len(record.began) < len(STEPS) or not record.odometry:
-        yield Doubt('the robot was not moved: nothing is known of how it obeys')
+        yield RobotDoubt('the robot was not moved: nothing is known of how it obeys')
         return
     yield from _of_obedience(record, profile)
     if not record.scans:
         return
     lag = scan_lag(record)
     if lag is not None and lag > MOST_LAG:
-        yield Doubt(
+        yield RobotDoubt(
             f'{profile.topics.scans[0]}: it is {lag:.1f} s later than the odometry: the driver or '
             'the network holds it back; the robot would turn with what it saw before'
         )
@@ -126,43 +126,43 @@ def _ways(record: MotionRecord) -> list[Pose]:
     ]
 
 
-def _of_obedience(record: MotionRecord, profile: RobotProfile) -> Iterator[Doubt]:
+def _of_obedience(record: MotionRecord, profile: RobotProfile) -> Iterator[RobotDoubt]:
     forth, _, turn = _ways(record)
     command = profile.topics.command
     if abs(forth[0]) < MOVED and abs(turn[2]) < TURNED:
         seen = _scan_motion(record)
         if seen is not None and seen > MOVED:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{profile.topics.odom}: it stands still while the scans move: it is not of this '
                 'base, or its driver does not count the wheels'
             )
         else:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{command}: the base does not move: an emergency stop, motors that are off, or '
                 'another program commands it'
             )
         return
     if forth[0] < -MOVED:
-        yield Doubt(
+        yield RobotDoubt(
             f'{command}: on a command forwards the odometry goes backwards: motors or encoders are '
             'reversed; mend it in the driver'
         )
     elif abs(math.atan2(forth[1], forth[0])) > 0.5 and math.hypot(*forth[:2]) > MOVED:
-        yield Doubt(
+        yield RobotDoubt(
             f'{profile.topics.odom}: on a command forwards it goes to the side: its axes are not '
             'those of REP-103 (x forwards), or its child frame is turned on the robot'
         )
     timeout = _timeout(record, profile)
     if timeout > MOST_TIMEOUT:
         more = 'more than ' if timeout >= SILENCE - 0.25 else ''
-        yield Doubt(
+        yield RobotDoubt(
             f'{command}: the base obeys the last command for {more}{timeout:.1f} s after silence: '
             f'expected {MOST_TIMEOUT:g} s at most (cmd_vel_timeout of its driver); it drives on '
             'when the patrol dies, and is refused'
         )
     delay = _delay(record)
     if delay is not None and delay > MOST_DELAY:
-        yield Doubt(f'{command}: the base begins to move {delay:.1f} s after a command')
+        yield RobotDoubt(f'{command}: the base begins to move {delay:.1f} s after a command')
 
 
 def _timeout(record: MotionRecord, profile: RobotProfile) -> float:
@@ -238,12 +238,12 @@ def _mount_finding(record: MotionRecord, mount: Mount, lag: float) -> MountFindi
 
 def _of_mount(
     finding: MountFinding, mounts: Sequence[Mount], record: MotionRecord, profile: RobotProfile
-) -> Iterator[Doubt]:
+) -> Iterator[RobotDoubt]:
     turn = _ways(record)[2][2]
     scan = profile.topics.scans[0]
     if finding.is_mirrored and turn < -TURNED:
         # The command breaks the tie: it was to the left.
-        yield Doubt(
+        yield RobotDoubt(
             f'{profile.topics.odom}: it turns to the right on a command to the left, and the scans '
             'turn to the left: its sense of turning is wrong; mend it in the driver (left and '
             'right encoder)'
@@ -263,11 +263,11 @@ def _of_mount(
         if finding.is_turned:
             off = abs(angle_between(finding.believed.pose[2], finding.fitting.pose[2]))
             what.append(f'is turned by {off:.2f} rad against the profile')
-        yield Doubt(f'{scan}: it {", and ".join(what)}', 'lidars.mounts', f'[{rows}]')
+        yield RobotDoubt(f'{scan}: it {", and ".join(what)}', 'lidars.mounts', f'[{rows}]')
     if finding.is_scaled:
         yield _wrong_scale(finding.scale or 1.0, profile)
     if finding.is_turn_scaled:
-        yield Doubt(
+        yield RobotDoubt(
             f'{profile.topics.odom}: it counts {1 / abs(finding.turn_scale or 1.0):.2f} rad for '
             "each radian that the scans see: the driver's wheel separation is wrong",
             'odometry.turn_scale',
@@ -275,9 +275,9 @@ def _of_mount(
         )
 
 
-def _wrong_scale(scale: float, profile: RobotProfile) -> Doubt:
+def _wrong_scale(scale: float, profile: RobotProfile) -> RobotDoubt:
     """Return what is said of odometry that counts wrong metres: `scale` true ones for each."""
-    return Doubt(
+    return RobotDoubt(
         f'{profile.topics.odom}: it counts {1 / scale:.2f} m for each metre that the scans see: '
         "the driver's wheel radius is wrong",
         'odometry.scale',

@@ -41,7 +41,7 @@ NAV2_NODES = frozenset(
 
 
 @dataclass(frozen=True)
-class Doubt:
+class RobotDoubt:
     """Something that cannot be as it is said.
 
     Attributes:
@@ -101,7 +101,7 @@ def battery_doubt(
     return ''
 
 
-def doubts(profile: RobotProfile, seen: GraphSample, namespace: str = '') -> Iterator[Doubt]:
+def doubts(profile: RobotProfile, seen: GraphSample, namespace: str = '') -> Iterator[RobotDoubt]:
     """Yield what cannot be true of what was heard from a robot that stands.
 
     Args:
@@ -118,15 +118,15 @@ def doubts(profile: RobotProfile, seen: GraphSample, namespace: str = '') -> Ite
     yield from _of_camera(profile, seen, namespace)
     for node, state in seen.states.items():
         if state != 'active':
-            yield Doubt(
+            yield RobotDoubt(
                 f"Nav2's {node} is {state}: it rejects each goal; have its lifecycle manager "
                 'activate it'
             )
-    yield from (Doubt(text) for text in seen.clashes)
+    yield from (RobotDoubt(text) for text in seen.clashes)
     corners = list(zip(profile.body.footprint[::2], profile.body.footprint[1::2], strict=True))
     if seen.footprint and not _same_corners(corners, seen.footprint):
         theirs = ', '.join(f'[{x:g}, {y:g}]' for x, y in seen.footprint)
-        yield Doubt(
+        yield RobotDoubt(
             f"Nav2's local_costmap has the footprint [{theirs}], the profile another: one of them "
             'is not of this robot',
             'body.footprint',
@@ -140,14 +140,14 @@ def _same_corners(one: Sequence[Sequence[float]], other: Sequence[Sequence[float
     return all(any(math.dist(a, b) < 0.01 for b in there) for here, there in both for a in here)
 
 
-def _of_rivals(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_rivals(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     topics = profile.topics
     command = named(topics.command, namespace)
     allowed = OWN_NODES if profile.dock.navigator == 'own' else NAV2_NODES
     rivals = sorted({end.node for end in _publishers(seen, command)} - _full(allowed, seen))
     rivals = [each for each in rivals if each.rpartition('/')[2] not in allowed]
     if rivals:
-        yield Doubt(
+        yield RobotDoubt(
             f'{command}: {", ".join(rivals)} commands the base as well: it does now what one says, '
             'now what the other; stop it, or let it publish to a multiplexer before the base'
         )
@@ -156,7 +156,7 @@ def _of_rivals(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
     for topic in (named(each, namespace) for each in streams):
         nodes = sorted({end.node for end in _publishers(seen, topic)} - {NAMELESS})
         if len(nodes) > 1:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{topic}: published by {" and ".join(nodes)}: expected one; what both say is '
                 'taken for one sensor'
             )
@@ -176,89 +176,89 @@ def _heard(seen: GraphSample, topic: str, namespace: str) -> tuple[str, TopicSam
     return name, seen.heard.get(name)
 
 
-def _of_stamps(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_stamps(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     for topic in (*profile.topics.scans, profile.topics.odom):
         name, heard = _heard(seen, topic, namespace)
         if heard is None or not heard.count:
             continue
         if heard.values.get('unstamped'):
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: its stamps are 0: its driver does not fill header.stamp, so that nobody '
                 'knows when it measured; it is taken for the present'
             )
         elif heard.age is not None and MOST_LATE < heard.age <= 2.0:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: its messages are {heard.age:.1f} s old when they come: the driver or the '
                 'network is late, or its clock is behind'
             )
         elif heard.age is not None and heard.age > 2.0 and seen.has_clock:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: its stamps are of the topic /clock: a simulation; start the patrol with '
                 '-p use_sim_time:=true'
             )
         if 0.0 < heard.rate < LEAST_RATE:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: {heard.rate:.1f} messages a second: expected {LEAST_RATE:g} or more; the '
                 'robot would drive blindly between two'
             )
 
 
-def _of_odometry(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_odometry(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     name, heard = _heard(seen, profile.topics.odom, namespace)
     frames = profile.frames
     if heard is None or not heard.count:
         found = [child for child, parent in seen.moving.items() if parent == frames.odom]
         if found and not _publishers(seen, name):
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: nobody publishes it, and {frames.odom} -> {found[0]} is on tf: odometry '
                 'comes by tf alone, and is read there'
             )
         return
     child = str(heard.values.get('child', '')).removeprefix('/')
     if child and child != frames.base:
-        yield Doubt(
+        yield RobotDoubt(
             f'{name}: its child_frame_id is {child!r}, the profile says frames.base: '
             f'{frames.base!r}',
             'frames.base',
             child,
         )
     elif not child:
-        yield Doubt(f'{name}: its child_frame_id is empty: expected {frames.base!r}')
+        yield RobotDoubt(f'{name}: its child_frame_id is empty: expected {frames.base!r}')
     if heard.values.get('jumps'):
-        yield Doubt(
+        yield RobotDoubt(
             f'{name}: it jumps by {heard.values["jumps"]:.1f} m while the robot stands: two '
             'drivers, or a driver that begins anew'
         )
 
 
-def _of_scans(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_scans(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     for topic in profile.topics.scans:
         name, heard = _heard(seen, topic, namespace)
         if heard is None or not heard.count:
             continue
         told = heard.values.get('told')
         if told is not None and told < 0.1:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: {told:.0%} of its rays tell a distance: the lidar is covered, or '
                 'does not turn'
             )
         near = heard.values.get('near', 0.0)
         if near > 0.15:
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: {near:.0%} of its rays end within the robot: it sees its own body; the '
                 'mount in the profile is wrong, or posts stand in its view'
             )
         if heard.values.get('frozen'):
-            yield Doubt(
+            yield RobotDoubt(
                 f'{name}: the same scan comes again and again: its driver repeats the last one'
             )
 
 
-def _of_frames(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_frames(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     frames = profile.frames
-    yield from (Doubt(f'tf: {text}') for text in seen.doubled)
+    yield from (RobotDoubt(f'tf: {text}') for text in seen.doubled)
     if profile.dock.navigator == 'own' and seen.moving.get(frames.odom) == frames.map:
-        yield Doubt(
+        yield RobotDoubt(
             f'tf: another program tells {frames.map} -> {frames.odom} (amcl, slam_toolbox), and '
             'the patrol would as well: end it, or let Nav2 drive (dock.navigator: nav2)'
         )
@@ -274,7 +274,7 @@ def _of_frames(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
         if math.dist(at[:2], row[:2]) > 0.03 or turned > 0.1:
             found = [*(round(each, 3) for each in at[:3]), math.pi if at[3] else 0.0]
             said = [f'[{", ".join(f"{each:.4g}" for each in found)}]']
-            yield Doubt(
+            yield RobotDoubt(
                 f'{named(topic, namespace)}: tf_static has its frame at {said[0]}, the profile at '
                 f'[{", ".join(f"{each:.4g}" for each in row)}]: one of them is wrong',
                 'lidars.mounts' if len(profile.topics.scans) == 1 else '',
@@ -282,7 +282,7 @@ def _of_frames(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
             )
 
 
-def _of_battery(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_battery(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     if profile.battery.source != 'topic' or profile.battery.voltages:
         return
     name, heard = _heard(seen, profile.topics.battery, namespace)
@@ -292,16 +292,16 @@ def _of_battery(profile: RobotProfile, seen: GraphSample, namespace: str) -> Ite
     assert heard is not None
     full, last = profile.battery.full, told[-1]
     if not math.isfinite(last):
-        yield Doubt(
+        yield RobotDoubt(
             f'{name}: percentage is not a number, as of a driver that measures the voltage alone: '
             'write battery.voltages, pairs of a voltage and its percent'
         )
     elif full == 1.0 and 1.2 < last <= 120.0:
         text = f'{name}: percentage {last:g} where 1 is full: the driver tells percent'
-        yield Doubt(text, 'battery.full', '100')
+        yield RobotDoubt(text, 'battery.full', '100')
     elif full == 100.0 and 0.0 < last <= 1.0:
         text = f'{name}: percentage {last:g} where 100 is full: expected a share from 0 to 1 then'
-        yield Doubt(text, 'battery.full', '1')
+        yield RobotDoubt(text, 'battery.full', '1')
     elif why := battery_doubt(
         last,
         full,
@@ -309,10 +309,10 @@ def _of_battery(profile: RobotProfile, seen: GraphSample, namespace: str) -> Ite
         voltage=float(heard.values.get('voltage', math.nan)),
         cells=int(heard.values.get('cells', 0)),
     ):
-        yield Doubt(f'{name}: {why}', 'battery.full', '100' if full == 1.0 else '1')
+        yield RobotDoubt(f'{name}: {why}', 'battery.full', '100' if full == 1.0 else '1')
 
 
-def _of_camera(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[Doubt]:
+def _of_camera(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iterator[RobotDoubt]:
     image, info = (
         named(each, namespace) for each in (profile.topics.image, profile.topics.camera_info)
     )
@@ -326,7 +326,7 @@ def _of_camera(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
             if any(end.type == 'sensor_msgs/CameraInfo' for end in ends)
         )
         near = others[0].removeprefix(named('', namespace).rstrip('/') + '/') if others else ''
-        yield Doubt(
+        yield RobotDoubt(
             f'{info}: nobody publishes it, and {nodes} publishes pictures: without it nothing has '
             'a place in them' + (f'; there is {others[0]}' if others else ''),
             'topics.camera_info' if near else '',
@@ -335,13 +335,13 @@ def _of_camera(profile: RobotProfile, seen: GraphSample, namespace: str) -> Iter
         return
     told = seen.heard.get(info)
     if told is not None and told.count and not told.values.get('focal'):
-        yield Doubt(
+        yield RobotDoubt(
             f'{info}: its matrix K is 0: the camera is not calibrated, and nothing has a place in '
             'its pictures'
         )
     sizes = [seen.heard[each].values.get('size') for each in (image, info) if each in seen.heard]
     if len(sizes) == 2 and None not in sizes and sizes[0] != sizes[1]:
-        yield Doubt(
+        yield RobotDoubt(
             f'{info}: it is of pictures of {sizes[1]}, those on {image} are {sizes[0]}: it is of '
             'another resolution'
         )
@@ -352,7 +352,7 @@ def amended(text: str, key: str, value: str) -> str:
 
     Args:
         text: The file's.
-        key: As in a `Doubt`.
+        key: As in a `RobotDoubt`.
         value: As JSON or a plain word.
     """
     part, _, name = key.rpartition('.')
