@@ -219,3 +219,27 @@ def test_a_photo_of_a_plan_becomes_a_place(tmp_path: Path) -> None:
         *('plan_place_map.yaml', 'plan_place_map.png'),
     }
     assert len(read_place(place).place.rooms) == 2
+
+
+def test_a_newer_map_of_the_open_place_keeps_names(tmp_path: Path) -> None:
+    plan = read_place(SEVEN).plan.grid()
+    write_map(tmp_path / 'new.yaml', plan.cells[::-1], 0.05, (*plan.origin, 0.0))
+    files = {
+        name: base64.b64encode((tmp_path / name).read_bytes()).decode()
+        for name in ('new.yaml', 'new.png')
+    }
+    desk = tmp_path / 'desk'
+    desk.mkdir()
+    place, said = import_dropped(files, desk, 0.22, older=SEVEN)
+    assert 'rooms kept: ' in said
+    assert set(read_place(place).place.rooms) >= {'R1', 'R2', 'R3', 'R4', 'E'}
+    assert SEVEN.exists()
+    empty = np.zeros((200, 300), np.int8)
+    empty[[0, -1]] = empty[:, [0, -1]] = 100
+    write_map(tmp_path / 'new.yaml', empty, 0.05, (0.0, 0.0, 0.0))
+    files = {
+        name: base64.b64encode((tmp_path / name).read_bytes()).decode()
+        for name in ('new.yaml', 'new.png')
+    }
+    with pytest.raises(ValueError, match=r'--update .*expected'):
+        import_dropped(files, tmp_path / 'desk2', 0.22, older=SEVEN)

@@ -36,6 +36,7 @@ def import_dropped(
     level: str = '',
     corners: str = '',
     scale: str = '',
+    older: Path | None = None,
 ) -> tuple[Path, str]:
     """Make a place of files; return it, and what was found in one line.
 
@@ -46,6 +47,7 @@ def import_dropped(
         radius: Of the robot, metres.
         resolution: Side of a picture's pixel, metres; empty: not given.
         level: The level of a building that has several; empty: not given.
+        older: The place of an older map of the building, whose names are kept; None: there is none.
         corners, scale: How a picture shows a plan, see `PlanPhoto.from_words`; empty: it is a map.
 
     Raises:
@@ -68,6 +70,7 @@ def import_dropped(
             resolution=None if photo else _side(resolution),
             level=level.strip(),
             photo=photo,
+            update=older,
         )
         try:
             if source.lower().endswith(_YAML) and not is_levels(contents[source]):

@@ -72,7 +72,7 @@ def editor_page(place: Path | None, host: str, port: int, radius: float, token: 
     def opened(path: Path) -> PlaceEditor:
         return PlaceEditor(path, radius=radius, more_checks=checked_names)
 
-    def import_map(files: Mapping[str, Any], *said_of_them: str) -> tuple[PlaceEditor, str]:
+    def import_map(files: Mapping[str, Any], *said_of_them: Any) -> tuple[PlaceEditor, str]:
         path, said = import_dropped(files, folder, radius, *said_of_them)
         return opened(path), said
 

@@ -116,6 +116,7 @@ class EditSession:
         level: str = '',
         corners: str = '',
         scale: str = '',
+        keep: bool = False,
     ) -> dict[str, Any]:
         make = self._import_map
         if make is None or not isinstance(files, Mapping):
@@ -124,7 +125,9 @@ class EditSession:
         def change() -> str:
             if self._open is not None and self._open.is_changed:
                 raise ValueError('the open place is not saved: save it, or undo its changes')
-            self._open, said = make(files, str(resolution), str(level), str(corners), str(scale))
+            older = self._open.path if keep and self._open is not None else None
+            said_of_them = str(resolution), str(level), str(corners), str(scale)
+            self._open, said = make(files, *said_of_them, older)
             return said
 
         return self._done(change)

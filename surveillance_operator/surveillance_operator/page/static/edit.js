@@ -36,6 +36,7 @@ function take(found) {
     draw();
   }
   for (const id of ['floor-section', 'chosen-section']) $(id).hidden = !place;
+  $('keep-label').hidden = !place;
   if (found.text) {
     $('said').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
     $('said').className = found.ok ? 'ok' : 'warn';
@@ -563,7 +564,7 @@ async function importMap(files, plan = {}) {
   try {
     const texts = await Promise.all([...dropped].map(async ([name, file]) => [name, await inText(file)]));
     view = chosen = null;
-    const found = await send('import_map', {files: Object.fromEntries(texts), resolution: $('scale').value, level: $('level').value, ...plan});
+    const found = await send('import_map', {files: Object.fromEntries(texts), resolution: $('scale').value, level: $('level').value, keep: Boolean(place) && $('keep').checked, ...plan});
     said.textContent = found.text ?? '';
     said.className = found.ok ? 'ok' : 'warn';
     if (found.ok) $('photo').hidden = true;
