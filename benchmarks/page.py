@@ -355,7 +355,7 @@ def main() -> None:
     parser.add_argument('--minutes', type=float, default=10.0, help='to watch memory; 0: not')
     options = parser.parse_args()
     size = sum(path.stat().st_size for path in PAGE_FILES.iterdir())
-    rows: list[Row] = [('page, all files', f'{size / 1000:.0f} kB', '150 kB')]
+    rows: list[Row] = [('page, all files', f'{size / 1000:.0f} kB', '300 kB')]
     with tempfile.TemporaryDirectory() as folder:
         rows += replay_rows(Path(folder), options.size.of(24.0, 1.0, 0.02))
         rows += mission_rows(Path(folder), options.size)
