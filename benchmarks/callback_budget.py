@@ -182,7 +182,8 @@ class Heard:
     Attributes:
         node, name: Of what.
         kind: The class of what it is told.
-        call: Tells it a message; the executor's thread may call it.
+        call: Tells it what `ready` made of a message; the executor's thread may call it.
+        ready: Makes of a message what the middleware would give.
         honest: Messages that were heard.
         on_honest: Called when one was.
     """
@@ -193,6 +194,7 @@ class Heard:
     call: Callable[[Any], Any]
     honest: list[Any] = field(default_factory=list)
     on_honest: Callable[[], object] = lambda: None
+    ready: Callable[[Any], Any] = lambda message: message
 
     @property
     def budget(self) -> float:
@@ -213,10 +215,9 @@ def _topic(node: Node, subscription: Subscription) -> Heard:
     only_message = subscription._callback_type is Subscription.CallbackType.MessageOnly
     number = 0
 
-    def call(message: Any) -> Any:
+    def call(told: Any) -> Any:
         nonlocal number
         number += 1
-        told = serialize_message(message) if subscription.raw else message
         if only_message:
             return callback(told)
         later = info['publication_sequence_number'] + number
@@ -228,6 +229,8 @@ def _topic(node: Node, subscription: Subscription) -> Heard:
 
     info: dict[str, Any] = dict(_NO_INFO)
     heard = Heard(node.get_name(), subscription.topic_name, subscription.msg_type, call)
+    if subscription.raw:
+        heard.ready = serialize_message
 
     def keep(*given: Any) -> Any:
         if len(heard.honest) < 3:
@@ -351,7 +354,7 @@ class Prober:
         for path in paths or [*fields_of(heard.kind)]:
             remaining = draws
             while remaining > 0:
-                batch = min(remaining, 50)
+                batch = min(remaining, 10)
                 remaining -= batch
                 messages = [
                     self._draws.changed(base[(remaining + i) % len(base)], path)
@@ -385,9 +388,13 @@ class Prober:
             nonlocal spent
             spent = max(spent, seconds)
 
+        try:
+            told = heard.ready(message)
+        except Exception:  # no peer can send it
+            return 0.0
         begun = time.thread_time()
         try:
-            returned = heard.call(message)
+            returned = heard.call(told)
         except Exception:  # it costs its message
             returned = None
         note(time.thread_time() - begun)

@@ -22,6 +22,7 @@ from surveillance_runtime.event_log import record_in
 from surveillance_runtime.profile import (
     ProfileFile,
     RobotProfile,
+    check_base,
     check_behaviour,
     find_profile,
     read_profile,
@@ -72,6 +73,7 @@ def configuration(
         merged.place('simulator', full_name(run.namespace, 'simulator'))
         _check_behaviour(merged, run)
         check_behaviour(profile_of(config, run), run.behaviour)
+        check_base(profile_of(config, run), run.mode or node_table.DEFAULT_MODE)
     except FileError as error:
         raise ValueError(f'parameter file {error}') from None
     return merged

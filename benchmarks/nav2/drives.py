@@ -41,7 +41,9 @@ topics: {command: cmd_vel, wanted: cmd_vel_wanted, odom: odom, scans: [scan], ma
 types: {command: TwistStamped}
 frames: {base: base_footprint, scans: [base_scan]}
 body: {radius: 0.22}
-drive: {speed: 0.5, turn: 1.0, acceleration: 0.5, deceleration: 2.5, turn_acceleration: 2.0}
+drive:
+  {speed: 0.5, turn: 1.0, acceleration: 0.5, deceleration: 2.5, turn_acceleration: 2.0,
+  command_timeout: 0.5}
 battery: {source: model}
 dock: {navigator: NAVIGATOR}
 arm: none

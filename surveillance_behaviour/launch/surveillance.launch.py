@@ -34,6 +34,7 @@ from surveillance_runtime.node_table import ALARM, MARKERS, RECORDER, find, sele
 from surveillance_runtime.node_table import Node as NodeOfTable
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.profile import (
+    check_base,
     check_behaviour,
     find_profile,
     read_profile,
@@ -85,6 +86,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     config = Path(get_package_share_directory('surveillance_behaviour'), 'config')
     robot = read_profile(find_profile(config, given['robot']))
     check_behaviour(robot, behaviour)
+    check_base(robot, mode)
     at = Path(given['map']) if given['map'] else None
     choice = Choice(
         _names(given['only']),

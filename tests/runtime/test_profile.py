@@ -13,6 +13,7 @@ from surveillance_runtime.node_table import select
 from surveillance_runtime.parameters import specs_of
 from surveillance_runtime.profile import (
     RobotProfile,
+    check_base,
     find_profile,
     profile_layer,
     profile_names,
@@ -146,3 +147,31 @@ def test_where_a_foreign_robot_s_lidar_is_nobody_guesses(tmp_path):
     assert read_profile(written(tmp_path, 'name: mine')).profile.lidars.mounts == ()
     built_in = RobotProfile()
     assert replace(built_in, name='mine').lidars.mounts
+
+
+@pytest.mark.parametrize(
+    ('drive', 'problem'),
+    [
+        ('command_timeout: 0.5', ''),
+        ('command_timeout: 0.2', ''),
+        ('command_timeout: 0.6', '0.6 s: expected at most 0.5 s'),
+        ('speed: 0.3', 'drive.command_timeout is missing'),
+        ('{command_timeout: 2.0, long_timeout: true}', ''),
+        ('long_timeout: true', ''),
+    ],
+)
+def test_a_base_that_obeys_on_is_refused_unless_told_otherwise(
+    tmp_path: Path, drive: str, problem: str
+) -> None:
+    path = tmp_path / 'robot.yaml'
+    words = drive if drive.startswith('{') else f'{{{drive}}}'
+    path.write_text(f'name: mine\ndrive: {words}\n')
+    file = read_profile(path)
+    check_base(file, 'SIMULATED')
+    if not problem:
+        check_base(file, 'ROBOT')
+        return
+    with pytest.raises(FileError, match=problem) as refused:
+        check_base(file, 'ROBOT')
+    assert '\n' not in str(refused.value)
+    assert 'drive.long_timeout: true' in str(refused.value)

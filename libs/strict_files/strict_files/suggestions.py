@@ -11,6 +11,8 @@ _ALIKE = 0.65
 _SHARED_WORD = 0.8
 _BEGUN_WORD = 0.7
 _SHORTEST_BEGINNING = 3
+_LONGEST = 200
+"""Letters of a given name that are looked at: a stranger's may have a million."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -42,6 +44,7 @@ def like(name: str, known: Iterable[str]) -> str:
 
 def _likeness(given: str, name: str) -> float:
     """Return 0 to 1, whatever the case; a name with it as a word, or its beginning, is like it."""
+    given = given[:_LONGEST]
     given, name = given.casefold().lstrip('-'), name.casefold().lstrip('-')
     ratio = difflib.SequenceMatcher(None, name, given).ratio()
     if given in re.split(r'[._/ -]', name):

@@ -52,9 +52,12 @@ class Doorman:
         self._thread = threading.Thread(target=self._run, name='page door', daemon=True)
 
     def start(self) -> None:
-        """Begin to accept."""
-        self._listening.listen(1024)
-        self._listening.setblocking(False)
+        """Begin to accept; nothing where it was stopped before."""
+        try:
+            self._listening.listen(1024)
+            self._listening.setblocking(False)
+        except OSError:
+            return
         self._selector.register(self._listening, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._thread.start()

@@ -6,6 +6,7 @@ file `robot.yaml`, `use` says what it means to the nodes of a run (parameters an
 """
 
 from surveillance_runtime.profile.node_configuration import (
+    check_base,
     check_behaviour,
     out_of_nav2s_way,
     profile_layer,
@@ -25,6 +26,7 @@ __all__ = [
     'BUILT_IN',
     'ProfileFile',
     'RobotProfile',
+    'check_base',
     'check_behaviour',
     'find_profile',
     'out_of_nav2s_way',

@@ -13,7 +13,7 @@ import numpy as np
 from lidar_navigation import MountCheck, MountFinding
 from lidar_navigation.exploration.scan_matching import Matcher, surface_of
 from lidar_navigation.geometry import Mount, Pose, Scan, angle_between, relative
-from surveillance_runtime.profile.record import RobotProfile
+from surveillance_runtime.profile.record import MOST_TIMEOUT, RobotProfile
 from surveillance_runtime.profile.truth_check import RobotDoubt
 
 SPEED, TURN_SPEED = 0.15, 0.5
@@ -22,8 +22,6 @@ WAY, TURN = 0.3, math.pi / 2
 """How far it is to go, metres, and to turn, radians."""
 SILENCE = 1.5
 """After the way forth nothing is commanded for so long, seconds; then that it is to stand."""
-MOST_TIMEOUT = 0.5
-"""A base that obeys the last command for longer than this is refused, seconds."""
 MOST_LAG = 0.3
 """Scans that are later than the odometry by more than this are late, seconds."""
 MOST_DELAY = 0.6
@@ -157,8 +155,9 @@ def _of_obedience(record: MotionRecord, profile: RobotProfile) -> Iterator[Robot
         more = 'more than ' if timeout >= SILENCE - 0.25 else ''
         yield RobotDoubt(
             f'{command}: the base obeys the last command for {more}{timeout:.1f} s after silence: '
-            f'expected {MOST_TIMEOUT:g} s at most (cmd_vel_timeout of its driver); it drives on '
-            'when the patrol dies, and is refused'
+            f'expected {MOST_TIMEOUT:g} s at most (cmd_vel_timeout of its driver; '
+            'drive.command_timeout in the profile); it drives on when the patrol dies, and is '
+            'refused'
         )
     delay = _delay(record)
     if delay is not None and delay > MOST_DELAY:

@@ -9,7 +9,7 @@ from strict_files.files import FileError
 from surveillance_runtime.configuration import Entry, Layer
 from surveillance_runtime.parameters import specs_of
 from surveillance_runtime.profile.reading import ProfileFile
-from surveillance_runtime.profile.record import RobotProfile
+from surveillance_runtime.profile.record import MOST_TIMEOUT, RobotProfile
 
 MONITOR = 'collision_monitor'
 MODEL_TOPIC = 'battery_state'
@@ -105,6 +105,28 @@ def check_behaviour(file: ProfileFile, behaviour: str) -> None:
             f'{origin}: arm: none, but --behaviour patrol looks for markers with a camera on an '
             'arm: expected --behaviour surveillance, or a robot with an arm'
         )
+
+
+def check_base(file: ProfileFile, mode: str) -> None:
+    """Make sure that a real base is known to stand when nobody commands it any more.
+
+    Raises:
+        FileError: It takes too long, and nobody says that it may; or nobody says how long.
+    """
+    drive, name = file.profile.drive, 'drive.command_timeout'
+    if mode != 'ROBOT' or drive.long_timeout:
+        return
+    expected = (
+        f'expected at most {MOST_TIMEOUT:g} s (cmd_vel_timeout of its driver), or '
+        'drive.long_timeout: true where the robot may drive on when the patrol dies'
+    )
+    if name not in file.profile.origins:
+        raise FileError(
+            f'{file.path}: {name} is missing, after how many seconds of silence the base stands: '
+            f'{expected}; `doctor --move` measures it'
+        )
+    if drive.command_timeout > MOST_TIMEOUT:
+        raise FileError(f'{file.profile.origins[name]}: {drive.command_timeout:g} s: {expected}')
 
 
 def unmonitored_entries(file: ProfileFile, nodes: Collection[str]) -> Iterator[Entry]:

@@ -37,6 +37,11 @@ def topic_names(names: Sequence[str]) -> str | None:
     return None if good else 'one name of a topic like scan, or more that differ'
 
 
+MOST_TIMEOUT = 0.5
+"""Seconds that a base may obey a command which nobody repeats: what a dead program began ends by
+that alone."""
+
+
 def frame_name(text: str) -> str | None:
     """Ask for the name of a frame."""
     return None if _FRAME.match(text) else 'the name of a frame like base_link'
@@ -197,6 +202,12 @@ class DriveLimits:
         ROBOT_DECELERATION, 'With which the base brakes when it must, m/s^2.', 0.05, 20.0
     )
     turn_acceleration: float = parameter(3.0, 'Turning acceleration, rad/s^2.', 0.01, 20.0)
+    command_timeout: float = parameter(
+        MOST_TIMEOUT, 'Seconds without a command after which the base stands by itself.', 0.0, 60.0
+    )
+    long_timeout: bool = parameter(
+        False, 'Whether a base may take longer for that: it drives on when the patrol dies.'
+    )
 
 
 @dataclass(frozen=True)
