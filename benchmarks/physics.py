@@ -6,6 +6,9 @@ hears the same odometry and scans. Wrong is an estimate more than 0.3 m off; sur
 that does not say it is lost or unsure.
 
     .venv/bin/python benchmarks/physics.py [--quick] [--place office]
+
+`--doors` drives in MuJoCo among doors that shut and open by chance, which the robot only sees; a
+goal counts as one that could be reached if a way was open when the drive ended.
 """
 
 from __future__ import annotations
@@ -24,9 +27,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from benchmarks.driven_robot import DrivenRobot
 from benchmarks.localisation import Amcl, print_table
 from benchmarks.sizes import sized_parser, skip
-from lidar_navigation import DriveState
+from lidar_navigation import DriveState, GridPlanner, NoPathError, PlanningParameters
 from lidar_navigation.geometry import Pose, Scan, composed, relative
 from lidar_navigation.localisation.odometry import OdometryBuffer
+from surveillance_controllers.motion.door_sight import DoorSight
 from surveillance_simulation.optional_mujoco import mujoco
 from surveillance_simulation.physics.model import PhysicsModel
 from surveillance_simulation.robot.base import BaseModel
@@ -90,17 +94,97 @@ def patrol(robot: Robot, seconds: float, seed: int) -> Outcome:
     return outcome
 
 
+DOOR_SECONDS = 30.0
+"""Mean time between two doors that shut or open, simulated seconds."""
+BESIDE_DOOR = 0.8
+"""No door shuts while the robot is nearer than this, metres."""
+
+
+def among_doors(robot: Robot, seconds: float, seed: int) -> list[str]:
+    """Drive from room to room while doors shut and open; return a row of the table."""
+    world, chance = robot.world, np.random.default_rng(seed + 1)
+    doors = {door.name: door.segment for door in world.plan.doors.values()}
+    sight = DoorSight(doors)
+    wrong_and_sure, steps, next_change, changes = 0, 0, 0.0, 0
+
+    def stepped() -> None:
+        nonlocal wrong_and_sure, steps, next_change, changes
+        navigator, now = driven.navigator, robot.time
+        if navigator.trusted is not None and sight.see(*navigator.trusted):
+            driven.planner.set_closed({name: doors[name] for name in sight.shut})
+        if navigator.pose is not None:
+            steps += 1
+            off = math.dist(navigator.pose[:2], robot.base.pose[:2])
+            wrong_and_sure += off > WRONG and navigator.is_sure
+        if now >= next_change:
+            next_change = now + float(chance.exponential(DOOR_SECONDS))
+            name = str(chance.choice(sorted(doors)))
+            x1, y1, x2, y2 = doors[name]
+            middle = (x1 + x2) / 2, (y1 + y2) / 2
+            if math.dist(middle, robot.base.pose[:2]) > BESIDE_DOOR:
+                world.set_door(name, not world.is_open(name))
+                changes += 1
+
+    driven = DrivenRobot(robot, robot.base.model.radius, stepped=stepped)
+    truth = GridPlanner(driven.grid, PlanningParameters(), doors=doors)
+    robot.measure()
+    while driven.navigator.pose is None:
+        driven.look()
+    arrived = missed = shut = 0
+    last, longest = robot.time, 0.0
+    rng = np.random.default_rng(seed)
+    for room, drive in driven.rooms(rng, lambda: robot.time >= seconds):
+        if not isinstance(drive, str) and drive.state is DriveState.ARRIVED:
+            arrived += world.place_at(*robot.base.pose[:2]) == room
+            longest, last = max(longest, robot.time - last), robot.time
+            continue
+        truth.set_closed({name: doors[name] for name in doors if not world.is_open(name)})
+        try:
+            truth.plan(robot.base.pose[:2], world.plan.place.positions[room][:2])
+            missed += 1
+        except NoPathError:
+            shut += 1
+        # As the mission does before it chooses again.
+        for _ in range(50):
+            driven.look()
+    longest = max(longest, robot.time - last)
+    return [
+        *map(str, (arrived, missed, shut, changes, robot.base.collisions)),
+        *(f'{wrong_and_sure / max(steps, 1):.2%}', f'{longest:.0f}'),
+    ]
+
+
+def print_among_doors(place: str, seconds: float, seed: int) -> None:
+    """Measure and print what `--doors` asks for."""
+    world = read_simulated_place(ROOT / 'config' / f'{place}.yaml')
+    lidar = LidarModel(noise=0.02)
+    rng = np.random.default_rng(seed)
+    robot = Robot(world, BaseModel(), lidar, rng=rng, physics=PhysicsModel())
+    print_table(
+        f'{seconds:.0f} simulated seconds in MuJoCo in {place}, among doors that shut and open.',
+        (
+            *('arrived', 'missed', 'no way was open', 'doors moved', 'contacts'),
+            *('wrong and sure', 'longest s without an arrival'),
+        ),
+        [among_doors(robot, seconds, seed)],
+    )
+
+
 def main() -> int:
     """Measure and print."""
     parser = sized_parser(__doc__, quick='120 simulated seconds')
     parser.add_argument('--place', default='office', help='a place of config/')
     parser.add_argument('--seconds', type=float, default=900.0, help='simulated')
     parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--doors', action='store_true', help='doors shut and open by chance')
     options = parser.parse_args()
     if mujoco is None:
         skip('mujoco is missing: pip install mujoco')
     logging.disable()
     seconds = options.size.of(options.seconds, 120.0, 5.0)
+    if options.doors:
+        print_among_doors(options.place, seconds, options.seed)
+        return 0
     file = ROOT / 'config' / f'{options.place}.yaml'
     bad = PhysicsModel(wheel_errors=(0.05, -0.05), friction=0.3)
     off = replace(bad, lidar_offset=(0.03, 0.02, 0.03))
