@@ -65,8 +65,19 @@ def explore(
     noise: float = 0.01,
     frontiers: FrontierParameters | None = None,
     most: float = 3600.0,
+    lost: float = 0.0,
 ) -> Explored:
-    """Explore a place with a robot whose odometry has so many times the usual errors."""
+    """Explore a place with a robot whose odometry has so many times the usual errors.
+
+    Args:
+        world: The place.
+        seed: Of all noise.
+        errors: Times the usual errors of the odometry.
+        noise: Of the lidar, metres.
+        frontiers: Which frontier comes first.
+        most: It ends after this time, seconds.
+        lost: This share of the scans never comes.
+    """
     usual = BaseModel()
     base = replace(
         usual,
@@ -78,11 +89,13 @@ def explore(
     builder = MapBuilder(start=robot.base.pose)
     exploration = Exploration(builder, frontiers=frontiers or FrontierParameters())
     angles, worst = robot.lidar.angles, 0.0
+    chance = np.random.default_rng(seed + 1)
     think_ms = []
     while exploration.phase is not Phase.DONE and robot.time < most:
         scan = Scan(angles, robot.scan().astype(float), robot.lidar.range_max)
-        velocity = exploration.see(scan, robot.base.odometry, robot.time)
-        robot.base.command(velocity.speed, velocity.turn)
+        if chance.random() >= lost:
+            velocity = exploration.see(scan, robot.base.odometry, robot.time)
+            robot.base.command(velocity.speed, velocity.turn)
         robot.advance(STEP)
         begun = time.process_time()
         if exploration.think():

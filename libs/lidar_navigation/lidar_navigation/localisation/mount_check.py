@@ -58,6 +58,8 @@ _SURE = 0.012
 corridor it is greater."""
 _STEADY = 0.1
 """Parts of a way whose scales differ by more than this from all are no scale: wheels slip."""
+_WAY_NOISE, _LEVER = 0.008, 0.08
+"""Standard deviation of a part of a way, and of where the lidar sits: a turn shows that, metres."""
 _LEAST_DOUBT = 0.01
 """A scale is never known better than this."""
 _COHERENT = 0.97
@@ -72,7 +74,8 @@ class MountFinding:
         believed: Where the lidar is said to sit.
         fitting: Where it sits if the odometry's directions are right.
         scale: True metres for each metre of the odometry; None: not known yet.
-        doubt: Standard deviation of the scale.
+        doubt: Standard deviation of the scale;
+        yaw_doubt: of the angle, rad.
         turn_scale: True radians for each radian of the odometry; None: not known yet.
     """
 
@@ -81,11 +84,13 @@ class MountFinding:
     scale: float | None = None
     turn_scale: float | None = None
     doubt: float = 0.0
+    yaw_doubt: float = 0.0
 
     @property
     def is_turned(self) -> bool:
         """Whether the lidar is turned otherwise than is said of it."""
-        return abs(angle_between(self.believed.pose[2], self.fitting.pose[2])) > MOST_YAW
+        off = abs(angle_between(self.believed.pose[2], self.fitting.pose[2]))
+        return off - 2 * self.yaw_doubt > MOST_YAW
 
     @property
     def is_mirrored(self) -> bool:
@@ -155,6 +160,7 @@ class MountCheck:
         self._way_from: tuple[Pose, Pose] = _NOTHING, _NOTHING
         self._turn_from: tuple[Pose, Pose] = _NOTHING, _NOTHING
         self._ways: deque[tuple[complex, complex]] = deque(maxlen=_KEPT)
+        self._bends: deque[float] = deque(maxlen=_KEPT)
         self._turns: deque[tuple[float, float]] = deque(maxlen=_KEPT)
 
     def see(self, scan: Scan, odometry: Pose) -> MountFinding | None:
@@ -196,6 +202,8 @@ class MountCheck:
             is_driven = _LEAST_SHARE <= abs(seen) / abs(way) <= 1 / _LEAST_SHARE
             if is_driven and deviation.max() <= _SURE:
                 self._ways.append((way, seen))
+                bent = abs(angle_between(self._way_from[0][2], driven[2]))
+                self._bends.append((_WAY_NOISE + _LEVER * bent) / abs(way))
             self._way_from = driven, found.pose
         if is_over:
             self._begin(scan, odometry)
@@ -236,7 +244,8 @@ class MountCheck:
         if self._length < DIRECTION_WAY and turn_scale is None:
             return
         doubt = 0.0 if scale is None else self._doubt(scale)
-        self.finding = MountFinding(self.mount, fitting, scale, turn_scale, doubt)
+        yaw_doubt = self._yaw_doubt() if self._ways else 0.0
+        self.finding = MountFinding(self.mount, fitting, scale, turn_scale, doubt, yaw_doubt)
         self.is_done = self.finding.fits and scale is not None and turn_scale is not None
 
     @property
@@ -260,6 +269,12 @@ class MountCheck:
         total = sum(products)
         is_coherent = abs(total) >= _COHERENT * sum(map(abs, products))
         return total / sum(abs(way) ** 2 for way, _ in pairs), is_coherent
+
+    def _yaw_doubt(self) -> float:
+        """Return the standard deviation of the direction: long parts count more."""
+        weights = [abs(way) ** 2 for way, _ in self._ways]
+        off = [weight * bend for weight, bend in zip(weights, self._bends, strict=True)]
+        return math.hypot(*off) / sum(weights)
 
     def _doubt(self, scale: float) -> float:
         off = [abs(seen) / abs(way) - scale for way, seen in self._ways]
