@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pytest
 
 from armor_service.store.assigned_numbers import assigned_numbers
@@ -30,7 +32,9 @@ def said(text: str, kind: str = 'integer') -> DataPropertyAssertion:
     return DataPropertyAssertion(PROP, ONE, Literal(text, XSD + kind))
 
 
-def assigned(axiom: Axiom, old: list[Axiom], come: list[Axiom], gone: list[Axiom]) -> list[Axiom]:
+def assigned(
+    axiom: Axiom, old: Sequence[Axiom], come: Sequence[Axiom], gone: Sequence[Axiom]
+) -> list[Axiom]:
     """Return what numbers that came are to be."""
     kb = KnowledgeBase('x:', [axiom, ax.ClassAssertion(CLS, ONE), *old])
     kb.reason()

@@ -53,11 +53,6 @@ class CaseCompletion:
         has_rules = any(isinstance(axiom, Rule) for axiom in schema)
         self._horn = HornCompleteness(engine, self._program, has_rules=has_rules)
         self._schema = schema
-        self._imports = [
-            f'owl:imports <{axiom.iri}> is not followed'
-            for axiom in schema
-            if type(axiom) is Import
-        ]
         self._native = tuple(self._program.unsupported)
         # Whether classes were compared, and whether that holds whatever is said of individuals.
         self._compared = self._stands = False
@@ -86,7 +81,9 @@ class CaseCompletion:
         found: Iterable[str] = [*self._program.unsupported, *self._horn.sentences()]
         if self._left_out is not None:
             found = self._left_out
-        return tuple(dict.fromkeys([*found, *self._imports]))
+        imports = (axiom.iri for axiom in self._schema if isinstance(axiom, Import))
+        told = (f'owl:imports <{iri}> is not followed' for iri in imports)
+        return tuple(dict.fromkeys([*found, *told]))
 
     def expect(self, added: Iterable[Axiom], removed: Iterable[Axiom]) -> None:
         """Take in a change of assertions before the engine does."""
