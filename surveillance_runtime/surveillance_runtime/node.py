@@ -149,15 +149,10 @@ class PatrolNode(Node):
         super().__init__(name, **node_options)
         self._logger = CleanLogger(self.get_logger().name)
         self._incident_topic = IncidentPublisher(self)
-        self.incidents = Incidents(
-            self._tell_incident,
-            name,
-            self.get_namespace().rpartition('/')[2],
-            lambda: 1e-9 * self.get_clock().now().nanoseconds,
-            time.monotonic,
-        )
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(INCIDENT_PERIOD, self.incidents.advance, clock=steady)
+        robot, steady = self.get_namespace().rpartition('/')[2], ClockType.STEADY_TIME
+        now = lambda: 1e-9 * self.get_clock().now().nanoseconds  # noqa: E731
+        self.incidents = Incidents(self._tell_incident, name, robot, now, time.monotonic)
+        self.create_timer(INCIDENT_PERIOD, self.incidents.advance, clock=Clock(clock_type=steady))
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
 
