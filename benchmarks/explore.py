@@ -219,6 +219,7 @@ def main() -> int:
     parser.add_argument('--place', action='append', type=Path, help='another place')
     parser.add_argument('--seeds', type=int, default=1)
     parser.add_argument('--errors', type=float, default=None, help='of the odometry, times')
+    parser.add_argument('--lost', type=float, default=0.0, help='share of scans that never come')
     parser.add_argument('--keep', type=Path, help='write the maps into this folder')
     parser.add_argument('--log', action='append', type=Path, help="only this log, FLIRT's format")
     options = parser.parse_args()
@@ -238,7 +239,12 @@ def main() -> int:
                 begun = time.process_time()
                 most = options.size.of(3600.0, 3600.0, 10.0)
                 did = explore(
-                    read_simulated_place(file), seed, errors=errors, noise=noise, most=most
+                    read_simulated_place(file),
+                    seed,
+                    errors=errors,
+                    noise=noise,
+                    most=most,
+                    lost=options.lost,
                 )
                 cpu = time.process_time() - begun
                 least = tour / BaseModel().speed
