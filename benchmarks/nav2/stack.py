@@ -183,9 +183,9 @@ def children_of(pid: int) -> dict[str, int]:
         except OSError:
             continue
         parents[int(folder.name)] = int(fields[1])
-        named = [word for word in words if '__node:=' in word or word.endswith('_node')]
-        name = (named or words)[0].rpartition('.')[2].rpartition('=')[2]
-        names[int(folder.name)] = name.removesuffix('_node')
+        # `motion_controller=module:Class` is how the launcher names the node of a process.
+        named = [word.partition('=')[0] for word in words if ':' in word and '_node:' in word]
+        names[int(folder.name)] = (named or words)[0]
 
     def is_below(each: int) -> bool:
         while each in parents and each != pid:

@@ -215,8 +215,9 @@ class MissionRecorder(PatrolNode):
                 TopicType(topic, kind, definition(kind), reliable, latched, depth, type_hash)
             )
             subscription = PolledSubscription(self, message_class(kind), topic, qos, raw=True)
-        except (ValueError, _rclpy.RCLError) as error:
-            # The middleware refuses a second type on a topic that this process has already.
+        except (ValueError, ImportError, AttributeError, _rclpy.RCLError) as error:
+            # A type that is not installed here, or a second one on a topic: the middleware refuses
+            # that to a process that has the other already.
             self._unknown.add(topic)
             self.get_logger().warn(f'topic {topic} is not recorded: {" ".join(str(error).split())}')
             return
