@@ -161,16 +161,16 @@ def test_a_type_that_is_not_installed_costs_its_topic(
     known = mission_recorder_node.message_class
 
     def lacking(kind: str) -> Any:
-        if kind.endswith('Image'):
+        if kind.endswith('LaserScan'):
             raise ModuleNotFoundError("No module named 'bond'")
         return known(kind)
 
     monkeypatch.setattr(mission_recorder_node, 'message_class', lacking)
     said = graph.said()
-    images = graph.node.create_publisher(Image, '/bond', 1)
+    lacked = graph.node.create_publisher(LaserScan, '/bond', 1)
     words = graph.node.create_publisher(String, '/words', STATE_QOS)
     folder = tmp_path / '20260101-000000' / 'recording'
-    graph.add(MissionRecorder, parameters={'folder': str(folder), 'all_images': True})
+    graph.add(MissionRecorder, parameters={'folder': str(folder)})
     graph.until(words.get_subscription_count)
     graph.until(lambda: any("/bond is not recorded: No module named 'bond'" in e for e in said))
-    assert images.get_subscription_count() == 0
+    assert lacked.get_subscription_count() == 0
