@@ -312,8 +312,7 @@ class PatrolNode(Node):
     ) -> Subscription:
         """Create a subscription as rclpy does; it only warns of a publisher it cannot hear.
 
-        What a stranger sends may be as long as it likes: a message with an array of too many others
-        is lost (`message_bounds`). Who takes serialized ones looks at their length.
+        A message with an array of too many others is lost (`message_bounds`).
         """
 
         def on_mismatch(event: QoSRequestedIncompatibleQoSInfo) -> None:
@@ -374,8 +373,7 @@ class PatrolNode(Node):
 
         def answer(request: Any, response: Any) -> Any:
             try:
-                if name.endswith(_OF_PARAMETERS):
-                    check_length(request, MOST_ASKED)
+                _check_asked(name, request)
                 return callback(request, response)
             except Exception as error:
                 return empty(error, request, response)
@@ -523,6 +521,11 @@ def _bounded(callback: Callable[[Any], Any], topic: str) -> Callable[[Any], Any]
         return callback(message)
 
     return bounded
+
+
+def _check_asked(service: str, request: Any) -> None:
+    if service.endswith(_OF_PARAMETERS):
+        check_length(request, MOST_ASKED)
 
 
 def report_exception(error: BaseException, node: Node, what: str) -> None:
