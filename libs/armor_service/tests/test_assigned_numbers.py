@@ -44,7 +44,7 @@ def assigned(
 @pytest.mark.parametrize('axiom', ALLOWS_ONE)
 def test_where_one_value_is_allowed_the_new_one_takes_its_place_and_type(axiom: Axiom) -> None:
     assert assigned(axiom, [said('7', 'long')], [said('8')], []) == [said('8', 'long')]
-    new = [said('0.5', 'decimal')]
+    new: list[Axiom] = [said('0.5', 'decimal')]
     assert assigned(axiom, [said('7', 'double')], new, []) == [said('0.5', 'double')]
 
 

@@ -203,10 +203,10 @@ def test_of_two_saves_at_once_one_is_refused(tmp_path: Path, turn: int) -> None:
             said[number] = str(error)
 
     threads = [threading.Thread(target=save, args=(number,)) for number in range(2)]
-    for each in threads:
-        each.start()
-    for each in threads:
-        each.join()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     (winner,) = [number for number, text in said.items() if text.startswith('written')]
     assert 'changed by somebody else' in said[1 - winner]
     assert f'R1: {600 + winner}' in path.read_text()

@@ -52,7 +52,9 @@ def photographed(image: np.ndarray) -> tuple[np.ndarray, PlanPhoto]:
     photo *= np.linspace(0.95, 0.55, 1600)[None, :, None]
     photo += np.random.default_rng(3).normal(0.0, 4.0, photo.shape)
     clicked = tuple((float(x), float(y)) for x, y in to)
-    return np.clip(photo, 0, 255).astype(np.uint8), PlanPhoto(clicked, clicked[:2], 10.0)
+    return np.clip(photo, 0, 255).astype(np.uint8), PlanPhoto(
+        clicked, (clicked[0], clicked[1]), 10.0
+    )
 
 
 @pytest.mark.parametrize('style', ['thick', 'thin', 'outlined'])
