@@ -141,7 +141,7 @@ def test_an_alarm_is_acknowledged_with_a_remark_and_shelved(desk: Desk) -> None:
     viewer = desk.viewer
     desk.done.clear()
     desk.alarms(ALERT)
-    viewer.until(lambda: viewer.count('.answers'))
+    viewer.until(lambda: viewer.count('.answers [data-verb=acknowledge]'))
     for words in ('rule: front door at night', '97 % sure', 'since '):
         assert words in viewer.text('#alarm-list')
     viewer.js('document.querySelector("[data-note]").value = "I go there"')
@@ -312,7 +312,7 @@ def test_a_guard_answers_and_stops_and_changes_nothing(desk: Desk) -> None:
     press(desk, 's')
     viewer.until(lambda: desk.done == ['stop True'])
     desk.alarms(ALERT)
-    viewer.until(lambda: viewer.count('.answers'))
+    viewer.until(lambda: viewer.count('.answers [data-verb=acknowledge]'))
     viewer.click('.answers [data-verb=acknowledge]')
     viewer.until(lambda: desk.done[1:] == ['acknowledge run//3 Anna'])
     viewer.driver.get(desk.page.address)
