@@ -222,6 +222,7 @@ class PlaceView:
         visited_at: When each place was visited last, seconds of the mission's time; 0: never yet.
         urgent: The places that the ontology has as URGENT.
         others: Where other robots are, by namespace.
+        coverage: Which part of each place was in view within its threshold, 0 to 1.
     """
 
     grid: Grid | None = None
@@ -234,6 +235,7 @@ class PlaceView:
     visited_at: Mapping[str, float] = field(default_factory=dict)
     urgent: frozenset[str] = frozenset()
     others: Mapping[str, Pose] = field(default_factory=dict)
+    coverage: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

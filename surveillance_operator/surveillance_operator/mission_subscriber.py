@@ -26,8 +26,8 @@ from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import SENSOR_QOS
 
-OF_ROBOT = ('door_lines', 'zones')
-"""What each robot of a fleet is asked for of the place; all else of it they share."""
+OF_ROBOT = ('door_lines', 'zones', 'coverage')
+"""What each robot of a fleet tells of the place by itself; all else of it they share."""
 SHARED = tuple(
     name for name, record in RECORD_OF.items() if record == 'place' and name not in OF_ROBOT
 )

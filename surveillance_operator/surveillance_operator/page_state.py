@@ -246,6 +246,7 @@ PARTS: Mapping[str, Callable[[MissionState], Any]] = {
         for name, zone in s.place.zones.items()
     },
     'stations': lambda s: {room: _rounded(pose) for room, pose in s.place.stations.items()},
+    'coverage': lambda s: {name: round(share, 2) for name, share in s.place.coverage.items()},
     'pose': lambda s: None if s.sensors.pose is None else _rounded(s.sensors.pose),
     'others': lambda s: {name: _rounded(pose) for name, pose in s.place.others.items()},
     'plan': _plan,

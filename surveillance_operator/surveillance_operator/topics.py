@@ -37,6 +37,7 @@ from surveillance_interfaces.msg import (
     Incident,
     MarkerDetectionArray,
     MissionStatus,
+    PlaceCoverages,
     RobotPlace,
 )
 from surveillance_ontology.armor_client import value_in
@@ -375,6 +376,20 @@ def doors_from(message: DoorStates) -> dict[str, bool]:
     return dict(sorted({**dict.fromkeys(opened, True), **dict.fromkeys(closed, False)}.items()))
 
 
+def coverage_from(message: PlaceCoverages) -> dict[str, float]:
+    """Return which part of each place was in view, 0 to 1; a place of which it is not known: none.
+
+    Raises:
+        ValueError: A part is not from 0 to 1, or there are too many places.
+    """
+    _names((each.place for each in message.places), 'places')
+    known = {each.place: each.share for each in message.places if not math.isnan(each.share)}
+    for place, share in known.items():
+        if not 0.0 <= share <= 1.0:
+            raise ValueError(f'a share of {share:g} of {place}: expected 0 to 1')
+    return known
+
+
 def point_from(message: Any) -> tuple[float, float]:
     """Return x and y of a point in metres.
 
@@ -555,6 +570,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic('stopped', Bool, lambda m, _: {'stopped': m.data}),
     Topic('map', OccupancyGrid, _on_map),
     Topic('door_states', DoorStates, _sets('doors', doors_from)),
+    Topic('coverage', PlaceCoverages, _sets('coverage', coverage_from)),
     Topic('obstacles', PointCloud2, _sets('obstacles', cloud_from)),
     Topic(POSE_TOPIC, PoseWithCovarianceStamped, _on_pose),
     Topic('plan', PathMessage, _sets('plan', path_from)),

@@ -229,6 +229,17 @@ def test_the_map_zooms_follows_and_hides_layers(desk: Desk) -> None:
     viewer.click('[data-layer=doors]')
 
 
+def test_the_map_shows_how_much_of_each_place_was_in_view(desk: Desk) -> None:
+    """On its own: no other part of the map changes with it."""
+    viewer = desk.viewer
+    viewer.click('[data-layer=coverage]')
+    place = next(iter(whole().place.positions))
+    for share, words in ((0.456, '46 % seen'), (1.0, '100 % seen')):
+        desk.show(coverage={place: share})
+        viewer.until(lambda words=words: viewer.text('#map .share') == words)
+    viewer.click('[data-layer=coverage]')
+
+
 def test_the_robot_is_told_where_it_is_by_a_drag(desk: Desk) -> None:
     viewer = desk.viewer
     desk.done.clear()

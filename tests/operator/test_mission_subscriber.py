@@ -18,10 +18,13 @@ from surveillance_interfaces.msg import (
     Decision,
     DoorStates,
     MissionStatus,
+    PlaceCoverage,
+    PlaceCoverages,
 )
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
 from surveillance_operator.mission_view_node import MissionViewNode
+from surveillance_operator.page_state import PARTS
 from surveillance_runtime.conversions import cloud_from_points
 from surveillance_runtime.qos import STATE_QOS
 from tests.operator.peers import PLACE, Planner, Watcher, pose, say
@@ -95,6 +98,15 @@ def test_it_gathers_what_topics_ontology_and_parameters_tell(graph: Any) -> None
     graph.remove(planner)
     graph.until(lambda: view.state.health.ended == {'planner_controller'})
     assert ('planner_controller ended') in view.state.notices[-1].text
+
+
+def test_what_of_each_place_was_in_view_reaches_the_page(graph: Any) -> None:
+    watcher = graph.add(Watcher)
+    seen = {'A': 0.456, 'B': 1.0, 'unknown': np.nan}
+    told = [PlaceCoverage(place=name, share=share) for name, share in seen.items()]
+    say(graph, 'coverage', PlaceCoverages(places=told))
+    graph.until(lambda: watcher.subscriber.state.place.coverage)
+    assert PARTS['coverage'](watcher.subscriber.state) == {'A': 0.46, 'B': 1.0}
 
 
 def test_where_nobody_estimates_the_pose_the_feedback_of_the_drive_tells_it(graph: Any) -> None:

@@ -12,7 +12,7 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import UInt8
 
-from surveillance_interfaces.msg import Decision
+from surveillance_interfaces.msg import Decision, PlaceCoverage, PlaceCoverages
 from surveillance_operator.mission_state import MissionState
 from surveillance_operator.topics import TOPICS, read_message, scan_from
 from surveillance_runtime.conversions import pose_from
@@ -39,6 +39,11 @@ def grid(**info: Any) -> OccupancyGrid:
         ('battery_level', UInt8(data=200), 'a level of 200 %'),
         ('obstacles', PointCloud2(width=9, height=9, point_step=12), '0 bytes came for 81 points'),
         ('obstacles', PointCloud2(width=10**6, height=1), 'expected at most'),
+        (
+            'coverage',
+            PlaceCoverages(places=[PlaceCoverage(place='A', share=1.5)]),
+            'a share of 1.5 of A',
+        ),
         ('scan', LaserScan(angle_min=math.inf), 'angles are not finite'),
     ],
 )

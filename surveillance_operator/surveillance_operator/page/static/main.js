@@ -121,7 +121,7 @@ function present() {
 }
 
 const MOST_TRAIL = 600;
-const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots', 'zones', 'stations'];
+const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots', 'zones', 'stations', 'coverage'];
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'brief', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],

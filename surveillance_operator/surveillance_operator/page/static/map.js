@@ -220,7 +220,7 @@ export class MapView {
     if (came('places', 'doors', 'markers', 'grid', 'robots')) this.declutter();
   }
 
-  // Which part of each room's floor the last look there saw.
+  // Which part of each room's floor was in view within its threshold.
   drawCoverage({coverage, places, regions}) {
     this.layers.coverage.replaceChildren(...Object.entries(coverage ?? {}).flatMap(([name, share]) => {
       const at = regions?.[name]?.label ?? places?.[name]?.at;
