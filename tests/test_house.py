@@ -41,7 +41,6 @@ LARGE_CLASSES = {
     'Frame': 'the loop that runs a machine',
     'GridPlanner': "one field of costs over a map's cells, and the search on it",
     'KnowledgeBase': "the library's face: a method a question",
-    'LocalisationParameters': 'parameters, a field each',
     'ManchesterParser': 'a method a rule of the grammar',
     'PhysicsBase': 'a body of MuJoCo: handles of its parts',
     'ContainerProgram': 'a machine as the loop reads it',
