@@ -5,9 +5,13 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
+import pytest
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
 from std_msgs.msg import Bool, Header, UInt8
 
 from surveillance_interfaces.msg import RobotPlace
+from surveillance_runtime import state_topics
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -68,6 +72,30 @@ def test_a_topic_of_changes_is_not_repeated_by_an_equal_foreign_value(graph: Any
     publisher.publish(Bool(data=False))
     graph.until(lambda: len(heard) == 4)
     assert [each.data for each in heard] == [True, True, False, True]
+
+
+def test_a_long_foreign_value_is_answered_without_being_read(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = graph.add(PatrolNode, name='owner')
+    plan = OwnedTopic(owner, Path, 'plan', repeat=None)
+    heard = graph.listen(Path, 'plan', STATE_QOS)
+    short, long = (Path(poses=[PoseStamped()] * count) for count in (200, 1000))
+    plan.publish(long)
+    graph.until(lambda: len(heard) == 1)
+    monkeypatch.setattr(state_topics, 'deserialize_message', lambda *_: pytest.fail('it is read'))
+    publisher = graph.node.create_publisher(Path, 'plan', STATE_QOS)
+    publisher.publish(long)
+    graph.until(lambda: len(heard) == 2)
+    publisher.publish(short)
+    graph.until(lambda: len(heard) == 4)
+    plan.publish(short)
+    graph.until(lambda: len(heard) == 5)
+    publisher.publish(long)
+    graph.until(lambda: len(heard) == 7)
+    # Two publishers are heard in any order.
+    said = sorted(len(each.poses) for each in heard)
+    assert said == [200, 200, 200, 1000, 1000, 1000, 1000], 'an equal one is not answered'
 
 
 def test_an_owner_that_was_started_again_is_heard(graph: Any) -> None:
