@@ -283,7 +283,6 @@ class Cost:
         seconds: Processor time.
         what: The value, shortened.
         calls: How many calls there were.
-        grown: Bytes of memory that the process holds more than before.
     """
 
     heard: Heard
@@ -291,7 +290,6 @@ class Cost:
     seconds: float = 0.0
     what: str = ''
     calls: int = 0
-    grown: int = 0
 
     @property
     def broken(self) -> bool:

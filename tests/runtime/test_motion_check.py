@@ -6,6 +6,7 @@ Half of the cases are taken from reports (the address stands beside the case).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from lidar_navigation.geometry import Mount, Pose, Scan, composed
 from lidar_navigation.testing import Flat
 from surveillance_runtime.profile.motion_check import (
     REST,
+    SPEED,
     STEPS,
     MotionRecord,
     motion_doubts,
@@ -21,7 +23,10 @@ from surveillance_runtime.profile.motion_check import (
 )
 from surveillance_runtime.profile.record import RobotProfile
 
-PROFILE = RobotProfile()
+TIMEOUT = 'drive.command_timeout'
+PROFILE = RobotProfile(origins={TIMEOUT: 'robot.yaml:3'})
+BRAKES = SPEED / PROFILE.drive.deceleration
+"""What a base that brakes as the profile says moves on for, seconds; `Moving` stands at once."""
 
 
 class Moving:
@@ -110,6 +115,24 @@ def test_what_a_motion_shows_is_named(case: str, like: dict[str, Any], cause: st
 def test_a_sound_robot_moves_without_a_doubt() -> None:
     assert Moving().said() == []
     assert Moving(mount=Mount((0.12, 0.0, 0.0)), timeout=0.4).said() == []
+
+
+def test_the_time_out_that_was_measured_is_a_line_for_the_profile() -> None:
+    record = Moving(timeout=0.38 + BRAKES).record()
+    (doubt,) = motion_doubts(record, RobotProfile())
+    assert (doubt.key, doubt.value) == (TIMEOUT, '0.4')
+    assert 'the profile does not say so' in doubt.text
+    told = replace(PROFILE, drive=replace(PROFILE.drive, command_timeout=0.1))
+    (doubt,) = motion_doubts(record, told)
+    assert (doubt.line, 'says 0.1 s' in doubt.text) == ('drive: {command_timeout: 0.4}', True)
+    (doubt,) = motion_doubts(Moving(timeout=0.95 + BRAKES).record(), RobotProfile())
+    assert doubt.key == TIMEOUT
+    assert float(doubt.value) == pytest.approx(0.95, abs=0.11)
+    assert 'is refused' in doubt.text
+    (doubt,) = motion_doubts(Moving(timeout=5.0).record(), RobotProfile())
+    assert not doubt.key, 'it did not stand: how long it takes is not known'
+    consents = replace(PROFILE, drive=replace(PROFILE.drive, long_timeout=True))
+    assert not [*motion_doubts(Moving(timeout=5.0).record(), consents)]
 
 
 def test_the_lag_of_scans_is_measured() -> None:

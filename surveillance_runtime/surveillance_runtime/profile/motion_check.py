@@ -28,6 +28,8 @@ MOST_DELAY = 0.6
 """A base that begins to move later than this after a command is slow, seconds."""
 MOVED, TURNED = 0.05, 0.15
 """It has moved, or turned, when it is by more than this, metres and radians."""
+UNSURE = 0.15
+"""How much longer a time-out may seem by odometry that comes ten times a second, seconds."""
 _LAGS = np.arange(0.0, 1.51, 0.05)
 _WINDOW = 0.5, 0.7
 
@@ -150,18 +152,43 @@ def _of_obedience(record: MotionRecord, profile: RobotProfile) -> Iterator[Robot
             f'{profile.topics.odom}: on a command forwards it goes to the side: its axes are not '
             'those of REP-103 (x forwards), or its child frame is turned on the robot'
         )
-    timeout = _timeout(record, profile)
-    if timeout > MOST_TIMEOUT:
-        more = 'more than ' if timeout >= SILENCE - 0.25 else ''
-        yield RobotDoubt(
-            f'{command}: the base obeys the last command for {more}{timeout:.1f} s after silence: '
-            f'expected {MOST_TIMEOUT:g} s at most (cmd_vel_timeout of its driver; '
-            'drive.command_timeout in the profile); it drives on when the patrol dies, and is '
-            'refused'
-        )
+    yield from _of_timeout(record, profile)
     delay = _delay(record)
     if delay is not None and delay > MOST_DELAY:
         yield RobotDoubt(f'{command}: the base begins to move {delay:.1f} s after a command')
+
+
+def _of_timeout(record: MotionRecord, profile: RobotProfile) -> Iterator[RobotDoubt]:
+    """Yield that the base obeys its last command for too long, or longer than the profile says.
+
+    The profile gets what was measured, rounded up, unless the base had not stood when it was
+    commanded to.
+    """
+    timeout, key = _timeout(record, profile), 'drive.command_timeout'
+    command, said = profile.topics.command, profile.drive.command_timeout
+    has_stood = timeout < SILENCE - 0.25
+    value = f'{max(1, math.ceil(10.0 * timeout - 0.2)) / 10:g}'
+    line = (key, value) if has_stood else ('', '')
+    if timeout > MOST_TIMEOUT and not profile.drive.long_timeout:
+        yield RobotDoubt(
+            f'{command}: the base obeys the last command for {"" if has_stood else "more than "}'
+            f'{timeout:.1f} s after silence: expected {MOST_TIMEOUT:g} s at most (cmd_vel_timeout '
+            f'of its driver; {key} in the profile); it drives on when the patrol dies, and is '
+            'refused',
+            *line,
+        )
+    elif has_stood and key not in profile.origins:
+        yield RobotDoubt(
+            f'{command}: the base stands {timeout:.1f} s after silence, and the profile does not '
+            'say so',
+            *line,
+        )
+    elif has_stood and timeout > said + UNSURE:
+        yield RobotDoubt(
+            f'{command}: the base stands {timeout:.1f} s after silence: the profile says {said:g} '
+            's',
+            *line,
+        )
 
 
 def _timeout(record: MotionRecord, profile: RobotProfile) -> float:
