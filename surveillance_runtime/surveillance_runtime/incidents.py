@@ -373,6 +373,8 @@ TOLD_AGAIN = 12 * SETTLED
 CONSEQUENCE = 'robot'
 """Kind of the causes that say how the robot fares. While what keeps it from its purpose is told by
 a cause of another kind, nobody is called for them as well."""
+BESIDE = frozenset({'event', 'sight', 'sink', 'disk', 'clock', 'page'})
+"""Kinds of the things that keep no robot from its purpose."""
 KEPT = 1000
 """How many incidents that are over are kept."""
 MOST_NUMBERS = 100
@@ -590,25 +592,47 @@ class IncidentBook:
         """Return the alarms, each with its consequences, which are no alarms of their own.
 
         Of one thing of one robot, as a shut door that the observer sees and that the mission waits
-        at, the later ones are consequences of the first; how the robot fares is one of whatever
-        else is wrong.
+        at, the later ones are consequences of the first; how a robot fares is one of what else is
+        wrong with it. An alarm that returned to normal and comes again is a new one (ISA-18.2),
+        and one that nobody was called for, as it is muted, speaks for no other.
         """
         alarms = [e for e in self._open.values() if e.incident.told.severity is Severity.ALARM]
-        found: dict[tuple[str, Cause], tuple[_Open, list[_Open]]] = {}
-        faring = []
+        faring = [e for e in alarms if e.incident.told.cause.kind == CONSEQUENCE]
+        joined: list[tuple[_Open, list[_Open]]] = []
+        newest: dict[tuple[str, Cause], tuple[_Open, list[_Open]]] = {}
         for each in alarms:
             told = each.incident.told
-            key = told.robot, thing_of(told)
             if told.cause.kind == CONSEQUENCE:
-                faring.append(each)
-            elif key in found:
-                found[key][1].append(each)
+                continue
+            thing = told.robot, thing_of(told)
+            known = newest.get(thing)
+            if known is not None and self._explains(known[0], each):
+                known[1].append(each)
             else:
-                found[key] = each, []
-        if not found:
-            return [(each, []) for each in faring]
-        next(iter(found.values()))[1].extend(faring)
-        return list(found.values())
+                joined.append((each, []))
+                newest[thing] = joined[-1]
+        causes = [each for each in joined if thing_of(each[0].incident.told).kind not in BESIDE]
+        for each in faring:
+            whose = '', each.incident.told.robot
+            for first, following in causes:
+                if first.incident.told.robot in whose and self._explains(first, each):
+                    following.append(each)
+                    break
+            else:
+                joined.append((each, []))
+        return joined
+
+    def _explains(self, first: _Open, later: _Open) -> bool:
+        """Tell whether somebody knows of an alarm, or is called, that had not returned before."""
+        incident = first.incident
+        returned = first.ends_at is not None and not first.is_lost
+        if returned and later.incident.began >= (first.ends_at or 0.0) - SETTLED:
+            return False
+        return (
+            incident.calls > 0
+            or bool(incident.told.acknowledged_by)
+            or not self._is_quiet(incident)
+        )
 
     def _escalates_at(self, each: _Open) -> float | None:
         """Return when others are called for an incident, too; None: all are."""

@@ -265,6 +265,63 @@ def test_a_consequence_that_outlives_its_cause_is_called_for() -> None:
     assert calls[-1] == 'the robot waits for help'
 
 
+WAITS = Cause('door', 'D3'), 'the robot waits for help'
+STUCK = Cause('robot', 'purpose'), 'nothing has happened for 60 s'
+
+
+def test_while_an_acknowledged_alarm_stands_another_of_the_same_thing_is_the_same() -> None:
+    incidents, calls, _ = book()
+    incidents.hear(seen_door(), 0.0)
+    incidents.hear(seen_door(acknowledged_by='Anna'), 10.0)
+    incidents.hear(alarm(*WAITS), 20.0)
+    incidents.advance(10 * FIRST_AGAIN)
+    assert calls == ['1: door D3 is closed in R3']
+
+
+@pytest.mark.parametrize('pause', [0.5, SETTLED + 1.0])
+def test_an_acknowledged_alarm_that_returned_and_comes_again_is_new(pause: float) -> None:
+    """At once, also when the first one's end is not told yet."""
+    incidents, calls, _ = book()
+    incidents.hear(seen_door(), 0.0)
+    incidents.hear(seen_door(acknowledged_by='Anna'), 10.0)
+    incidents.hear(seen_door(over=True), 100.0)
+    incidents.advance(100.0 + pause)
+    again = SeenThing(2, 'door', 'closed', 'D3')
+    told = alarm(Cause('event', '2'), '2: D3 is closed', node='observer', finding=again)
+    incidents.hear(told, 100.0 + pause)
+    assert calls[-1] == '2: D3 is closed'
+    incidents.advance(100.0 + SETTLED)
+    assert sum(each.startswith('all clear') for each in calls) == 1
+
+
+def test_how_a_robot_fares_follows_from_what_is_wrong_with_that_robot() -> None:
+    """Who takes care of a stranger, or of another robot's door, is called for a stuck robot."""
+    incidents, calls, _ = book()
+    person = SeenThing(1, 'person', 'there')
+    incidents.hear(alarm(Cause('event', '1'), 'a person', finding=person, robot='r1'), 0.0)
+    incidents.hear(alarm(*WAITS, robot='r2'), 0.0)
+    for cause, robot in ((Cause('event', '1'), 'r1'), (WAITS[0], 'r2')):
+        incidents.hear(alarm(cause, 'seen', robot=robot, acknowledged_by='Anna'), 1.0)
+    del calls[:]
+    incidents.hear(alarm(*STUCK, robot='r2'), 2.0)
+    assert not calls
+    incidents.hear(alarm(*STUCK, robot='r1'), 3.0)
+    assert calls == [STUCK[1]]
+
+
+def test_an_alarm_that_nobody_was_called_for_speaks_for_no_other() -> None:
+    """The doors are muted for the night, and the robot waits at one."""
+    calls: list[str] = []
+    muted = IncidentBook(
+        lambda call: calls.append(call.text),
+        is_quiet=lambda incident: incident.told.cause.kind == 'event',
+    )
+    muted.hear(seen_door(), 0.0)
+    muted.hear(alarm(*STUCK), 1.0)
+    muted.hear(alarm(*WAITS), 2.0)
+    assert calls == [STUCK[1], f'{WAITS[1]}; so: {STUCK[1]}']
+
+
 def test_a_false_alarm_two_seconds_before_the_end_is_told() -> None:
     incidents, calls, _ = book()
     incidents.hear(seen_door(), 0.0)
