@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from launcher.environment import COMMAND, PROGRAM
-from launcher.run import Run, shared_options, wanted_run
+from launcher.run import NOT_RECORDED, Run, shared_options, wanted_run
 from surveillance_runtime.command_line import EXIT_BAD_INPUT, CommandParser
 from surveillance_runtime.node_table import DEFAULT_MODE, EXPLORER
 
@@ -55,6 +55,12 @@ def options_of(argv: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--force', action='store_true', help='write over what is there already')
     parser.add_argument(
         '--for', dest='seconds', type=float, metavar='SECONDS', help='end after this time'
+    )
+    parser.add_argument(
+        '--record',
+        default=NOT_RECORDED,
+        metavar='off|DIR',
+        help="record as `run` does; the run's folder is made below DIR (default: %(default)s)",
     )
     options = parser.parse_args(argv)
     if options.out.suffix not in ('.yaml', '.yml'):
@@ -106,7 +112,6 @@ def run_exploration(options: argparse.Namespace, config: Path, runs: Path) -> in
         mode=mode,
         only=nodes if mode == 'SIMULATED' else nodes[1:],
         fresh=True,
-        record='off',
     )
 
     def entries(folder: Path) -> Iterator[Entry]:

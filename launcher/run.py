@@ -350,12 +350,14 @@ class Run:
     def observers(self) -> tuple[node_table.Node, ...]:
         """Return the nodes that only look on; they start last.
 
-        With `only` nothing is recorded; what was asked for by its own option starts.
+        With `only` nothing is recorded, an exploration apart, which is a whole run; what was asked
+        for by its own option starts.
         """
         names = []
         if not self.only or self.alarm or self.notify is not None:
             names.append(ALARM)
-        if self.record != NOT_RECORDED and not self.only:
+        is_whole = not self.only or node_table.EXPLORER in self.only
+        if self.record != NOT_RECORDED and is_whole:
             names += [RECORDER, MARKERS]
         if self.watch is not None:
             names.append(OBSERVER)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
 from launcher.explore import EXIT_NOTHING_SEEN, close, options_of
+from launcher.run import MARKERS, RECORDER, wanted_run
 from surveillance_controllers.explorer_node import DONE_FILE, MAP_FILE
+from surveillance_runtime.node_table import EXPLORER
 
 CONFIG = Path(__file__).parents[2] / 'config'
 
@@ -120,3 +123,14 @@ def test_a_run_that_saw_nothing_says_so(
     monkeypatch.chdir(tmp_path)
     assert close(tmp_path, options_of([]), CONFIG) == EXIT_NOTHING_SEEN
     assert 'nothing was mapped' in capsys.readouterr().err
+
+
+def test_an_exploration_is_recorded_where_somebody_asks_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    only = ('simulator', EXPLORER)
+    for words, names in (([], []), (['--record', 'rec'], [RECORDER, MARKERS])):
+        run = replace(wanted_run(options_of(words)), only=only)
+        started = {node.name for node in run.observers()} & {RECORDER, MARKERS}
+        assert started == set(names)
