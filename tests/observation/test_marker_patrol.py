@@ -96,7 +96,7 @@ class Patrol:
             explored=0.0,
             settings=settings,
             looked=InspectionLog(),
-            ports=SimpleNamespace(looking=self),
+            ports=SimpleNamespace(looking=self, sweeping=None),
             note=lambda *_, **__: None,
             say=lambda *_, **__: None,
         )
