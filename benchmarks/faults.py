@@ -55,7 +55,7 @@ from std_msgs.msg import Bool
 from benchmarks.callback_budget import BUDGET, Cost, Draws, Prober, heard_by
 from benchmarks.campaign import Launcher, Watcher
 from benchmarks.machine_faults import FrozenThreads, SmallDisk
-from benchmarks.processes import end_processes
+from benchmarks.processes import end_processes, memory_mb
 from benchmarks.sizes import Size, sized_parser
 from benchmarks.tables import table
 from benchmarks.whole_stack import Stack
@@ -553,6 +553,7 @@ def callbacks(chosen: Chosen) -> list[Row]:
     stack = Stack(ROOT / 'config' / 'seven_rooms.yaml')
     costs: list[Cost] = []
     hangs = []
+    grown: list[tuple[float, str]] = []
     try:
         heard = [each for node in stack.nodes.values() for each in heard_by(node)]
         stack.start()
@@ -563,6 +564,7 @@ def callbacks(chosen: Chosen) -> list[Row]:
         )
         gc.disable()
         begun = time.monotonic()
+        held = memory_mb(os.getpid())
         for each in heard:
             if time.monotonic() - begun > chosen.size.of(math.inf, 25.0, 5.0):
                 break
@@ -572,6 +574,8 @@ def callbacks(chosen: Chosen) -> list[Row]:
                 hangs.append(f'{each.node} {each.name}: {error}')
                 break
             gc.collect()
+            before_it, held = held, memory_mb(os.getpid())
+            grown.append((held - before_it, f'{each.node} {each.name}'))
     finally:
         gc.enable()
         os.chdir(before)
@@ -588,12 +592,19 @@ def callbacks(chosen: Chosen) -> list[Row]:
     broken = [cost for cost in costs if cost.broken]
     small = max((cost.seconds for cost in costs if cost.heard.budget == BUDGET), default=0.0)
     large = max((cost.seconds for cost in costs if cost.heard.budget != BUDGET), default=0.0)
+    most, where = max(grown, default=(0.0, 'nothing'))
+    later = sum(each for each, _ in grown[len(grown) // 2 :])
     words = (
         f'{1e3 * small:.1f} ms ({1e3 * large:.1f}), {len(broken)} over the budget, '
         f'{len(hangs)} hangs; {len(costs)} of {len(heard)} names, '
         f'{sum(cost.calls for cost in costs)} calls, {chosen.draws} of a field'
     )
+    flat = (
+        f'{sum(each for each, _ in grown):+.0f} MB, in the second half {later:+.0f}; most by '
+        f'{where}: {most:+.0f}'
+    )
     return [
+        ('the same: memory of the process', flat, 'flat'),
         ('dearest callback, every field log-uniform', words, '10 ms (50); 0 hangs'),
         *((f'hang: {hang}', '', '') for hang in hangs),
     ]

@@ -15,6 +15,8 @@ MOST_ELEMENTS = 2000
 which a thread of their own takes."""
 MOST_ASKED = 500
 """Parameters that one request asks for or sets."""
+MOST_VALUES = 20_000
+"""Elements of all the values together that one request sets."""
 MOST_BYTES = 131_072
 """Bytes of such a message before it is taken apart, which costs the most."""
 _MAY_BE_LONG = ('FactChanges',)
@@ -67,3 +69,19 @@ def check_length(message: Any, most: int = MOST_ELEMENTS) -> None:
         count = len(getattr(message, name))
         if count > most:
             raise ValueError(f'{name} has {count} elements: expected at most {most}')
+
+
+def check_asked(request: Any) -> None:
+    """Look at a request to a service of parameters before it is worked on.
+
+    Raises:
+        ValueError: It asks for too many, or sets values that are too long.
+    """
+    check_length(request, MOST_ASKED)
+    values = [each.value for each in getattr(request, 'parameters', ())]
+    arrays = (
+        [name for name in _fields(values[0]) if name.endswith('_array_value')] if values else ()
+    )
+    count = sum(len(getattr(value, name)) for value in values for name in arrays)
+    if count > MOST_VALUES:
+        raise ValueError(f'its values have {count} elements: expected at most {MOST_VALUES}')

@@ -52,7 +52,7 @@ from surveillance_runtime.health import Health
 from surveillance_runtime.incident_topic import IncidentPublisher
 from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
 from surveillance_runtime.logging import CleanLogger
-from surveillance_runtime.message_bounds import MOST_ASKED, check_length, lists_of
+from surveillance_runtime.message_bounds import check_asked, check_length, lists_of
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
 
 if TYPE_CHECKING:
@@ -373,7 +373,8 @@ class PatrolNode(Node):
 
         def answer(request: Any, response: Any) -> Any:
             try:
-                _check_asked(name, request)
+                if name.endswith(_OF_PARAMETERS):
+                    check_asked(request)
                 return callback(request, response)
             except Exception as error:
                 return empty(error, request, response)
@@ -521,11 +522,6 @@ def _bounded(callback: Callable[[Any], Any], topic: str) -> Callable[[Any], Any]
         return callback(message)
 
     return bounded
-
-
-def _check_asked(service: str, request: Any) -> None:
-    if service.endswith(_OF_PARAMETERS):
-        check_length(request, MOST_ASKED)
 
 
 def report_exception(error: BaseException, node: Node, what: str) -> None:

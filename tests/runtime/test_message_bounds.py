@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from rcl_interfaces.srv import ListParameters, SetParameters
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import PointCloud2, PointField
@@ -17,6 +18,7 @@ from surveillance_runtime.conversions import trajectory_from
 from surveillance_runtime.message_bounds import (
     MOST_BYTES,
     MOST_ELEMENTS,
+    MOST_VALUES,
     check_bytes,
     check_length,
     lists_of,
@@ -76,6 +78,18 @@ def test_a_long_request_for_parameters_is_refused_with_an_answer(graph: Any) -> 
     request = SetParameters.Request()
     answer = setter.call(request, 60.0)
     assert len(answer.results) == 0
+
+
+def test_a_request_that_sets_long_values_is_refused_with_an_answer(graph: Any) -> None:
+    node = graph.add(PatrolNode, name='node')
+    node.declare_parameter('numbers', [1])
+    setter = ServiceCaller(graph.node, SetParameters, 'node/set_parameters')
+    for count, is_taken in ((MOST_VALUES, True), (MOST_VALUES + 1, False)):
+        wish = Parameter('numbers', value=[5] * count).to_parameter_msg()
+        (result,) = setter.call(SetParameters.Request(parameters=[wish]), 60.0).results
+        assert result.successful is is_taken, result.reason
+    assert f'{MOST_VALUES + 1} elements: expected at most {MOST_VALUES}' in result.reason
+    assert len(node.get_parameter('numbers').value) == MOST_VALUES
 
 
 def test_a_trajectory_has_no_more_values_than_joints() -> None:
