@@ -56,8 +56,7 @@ NOTHING_RECORDED = 'Mission: nothing was recorded.'
 EXIT_NOTHING_DONE = 1
 """The exit code of a run that had all its time and in which the mission did not begin."""
 
-
-LOST = 'Mission: '
+LOST = 'Mission: its record cannot be read: '
 """How the summary begins of a mission whose record cannot be read."""
 
 

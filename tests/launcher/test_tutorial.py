@@ -10,11 +10,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from floor_plans import read_place
 from floor_plans.occupancy_map import write_map
 from launcher import cli
+from libs.floor_plans.tests.test_plan_photo import CORNERS, plan
 from libs.floor_plans.tests.test_rmf_building import building, level
 from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
 
@@ -111,6 +114,10 @@ def test_the_page_about_your_building_does_what_it_says(
     write_map(tmp_path / 'building.yaml', grid.cells[::-1], 0.05, (*grid.origin, 0.0))
     (tmp_path / 'plan.png').write_bytes((tmp_path / 'building.png').read_bytes())
     building(tmp_path, level('L1', 0.0), level('L2', 4.0))
+    on_the_wall = np.array([(210, 650), (2100, 640), (2160, 3020), (170, 3080)], np.float32)
+    turn = cv2.getPerspectiveTransform(np.array(CORNERS, np.float32), on_the_wall)
+    photo = cv2.warpPerspective(plan(24), turn, (2400, 3300), borderValue=(235, 240, 240))
+    cv2.imwrite(str(tmp_path / 'photo.jpg'), photo)
     said, shown, driven = '', 0, 0
     for language, text in blocks('your_building.md'):
         if language == 'yaml':  # zones, which a person adds to the place
@@ -134,6 +141,6 @@ def test_the_page_about_your_building_does_what_it_says(
     assert (shown, driven) == (2, 1)
     assert '7 doors' in said
     assert {path.name for path in tmp_path.glob('*_place.yaml')} == {
-        *('plan_place.yaml', 'clinic_place.yaml'),
+        *('plan_place.yaml', 'photo_place.yaml', 'clinic_place.yaml'),
     }
     assert (tmp_path / 'masks' / 'costmap_filters.yaml').exists()
