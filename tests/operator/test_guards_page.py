@@ -39,6 +39,7 @@ class Desk:
             questions={
                 'search': self._search,
                 'event': lambda key: {'ok': True, 'event': ALERT},
+                'place': lambda: {'ok': True},
                 'choices': lambda: {
                     'ok': True,
                     'places': ['R3'],
@@ -135,6 +136,31 @@ def test_an_alarm_stands_in_the_head_the_title_and_the_icon_of_every_view(desk: 
     # Acknowledged is not over.
     assert 'acknowledged by Anna' in viewer.text('#alarm-list')
     assert viewer.js('return document.title').startswith('A ')
+
+
+def test_the_editor_has_the_open_alarms_and_stop(desk: Desk) -> None:
+    viewer = desk.viewer
+    desk.done.clear()
+    desk.alarms(ALERT)
+    viewer.js('location.href = "/edit"')
+    try:
+        viewer.until(lambda: 'door D6 is open in R3' in viewer.text('#bar'))
+        assert viewer.js('return document.title').startswith('(1) ')
+        viewer.click('#bar [data-verb=acknowledge]')
+        viewer.until(lambda: len(desk.done) == 1)
+        press(desk, 's')
+        viewer.until(lambda: len(desk.done) == 2)
+        assert desk.done == ['acknowledge run//3 operator', 'stop True']
+        desk.alarms()
+        viewer.until(lambda: viewer.js('return document.getElementById("bar").hidden'))
+        desk.show(stopped=True)
+        viewer.until(lambda: not viewer.js('return document.getElementById("release").hidden'))
+        viewer.click('#release')
+        viewer.until(lambda: desk.done[-1] == 'stop False')
+        desk.show(stopped=False)
+    finally:
+        viewer.js('location.href = "/"')
+        viewer.until(lambda: viewer.text('#title').startswith('surveillance'))
 
 
 def test_an_alarm_is_acknowledged_with_a_remark_and_shelved(desk: Desk) -> None:

@@ -1,10 +1,9 @@
 // What is open: a bar in the head, cards with pictures and buttons, the title, the icon, a sound, the browser's own notices.
 import {$, h, s, act, age, timeOfDay} from './dom.js';
+import {AlarmBar, headline, loudOf} from './head.js';
 import {open, typing, view} from './views.js';
 
-const LOUD = ['unacknowledged', 'returned'];
 const NAMES = {unacknowledged: 'not acknowledged', returned: 'over, not acknowledged'};
-const BAR = 3;
 const SHELF = '2 h';
 const BEEPS = [0, .25, .5];
 const DAY = 86400;
@@ -12,7 +11,6 @@ const DAY = 86400;
 export const level = ({level}) => level ?? 'note';
 export const stateName = (state) => NAMES[state] ?? state;
 export const moment = (at, now) => `${Math.abs(now - at) > DAY / 2 ? new Date(1000 * at).toLocaleDateString('en-GB') + ' ' : ''}${timeOfDay(at)}`;
-export const headline = (event) => `${event.robot ? event.robot + ': ' : ''}${event.text}${event.place ? ' in ' + event.place : ''}`;
 const sure = (event) => (event.confidence ? `${Math.round(100 * event.confidence)} % sure` : '');
 
 export function pictures(event) {
@@ -79,6 +77,7 @@ export class Alarms {
     this.chosen = null;
     this.known = null;
     this.cards = new Map();
+    this.bar = new AlarmBar({may, wall, desk: '#/desk', choose: (key) => this.choose(key, true), told: (found) => this.told(found)});
     this.spots = s('g', {class: 'spots'});
     const loud = localStorage.getItem('sound') === 'on';
     $('sound').setAttribute('aria-pressed', String(loud));
@@ -87,14 +86,14 @@ export class Alarms {
   }
 
   get loud() {
-    return this.events.filter((each) => each.severity >= 3 && LOUD.includes(each.state));
+    return loudOf(this.events);
   }
 
   show(desk) {
     this.events = desk?.open ?? [];
     const loud = this.loud;
     this.call(loud);
-    this.bar(loud);
+    this.bar.show(loud);
     this.list();
     this.icon(loud.length);
     this.drawSpots();
@@ -131,26 +130,6 @@ export class Alarms {
       tone.start(this.audio.currentTime + after);
       tone.stop(this.audio.currentTime + after + .15);
     }
-  }
-
-  bar(loud) {
-    const now = this.wall();
-    const rest = loud.length - BAR;
-    const lines = loud.slice(0, BAR).map((event) => h('li', {'data-bar': event.key},
-      h('a', {href: '#/desk', onclick: () => this.choose(event.key, true)}, h('b', {}, event.state === 'returned' ? 'WAS' : 'ALARM'), ` ${headline(event)}`),
-      h('span', {class: 'age', 'data-since': event.began}, ` ${age(now - event.began)}`),
-      this.may ? h('button', {type: 'button', 'data-verb': 'acknowledge', 'aria-label': `Acknowledge ${event.text}`, onclick: async () => this.told(await act('alarm', {verb: 'acknowledge', key: event.key}))}, 'Acknowledge') : null));
-    if (rest > 0) lines.push(h('li', {}, h('a', {href: '#/desk'}, `and ${rest} more`)));
-    const text = lines.map((each) => each.dataset.bar ?? each.textContent).join() + loud.map((each) => each.state).join();
-    $('bar').hidden = !lines.length;
-    if (text === this.barred) return;
-    this.barred = text;
-    $('bar').replaceChildren(...lines);
-  }
-
-  tick() {
-    const now = this.wall();
-    for (const each of document.querySelectorAll('[data-since]')) each.textContent = ` ${age(now - each.dataset.since)}`;
   }
 
   // A card is made anew only when its event has changed: what somebody types in it stays.

@@ -1,5 +1,6 @@
 // What a person may do: one form for each thing, and what came of it below the form.
 import {$, h, act, names} from './dom.js';
+import {startStop} from './head.js';
 
 // An example of each controller's commands.
 const COMMANDS = {
@@ -41,7 +42,7 @@ export class Control {
   constructor(state, may, guard = may) {
     this.state = state;
     this.may = may;
-    if (guard) this.stops();
+    if (guard) startStop();
     if (!may) return;
     for (const button of document.querySelectorAll('[data-machine]')) {
       button.addEventListener('click', async () => {
@@ -76,22 +77,6 @@ export class Control {
       this.answer,
     );
     this.controller.addEventListener('change', () => { this.command.value = COMMANDS[this.controller.value]; });
-  }
-
-  // Stop and release, which a guard may, too.
-  stops() {
-    for (const [id, on] of [['stop', true], ['release', false]]) {
-      $(id).addEventListener('click', async () => {
-        $('stop-answer').textContent = (await act('stop', {on})).text;
-      });
-    }
-    // The key stops, wherever one is on the page; not while one types.
-    document.addEventListener('keydown', (event) => {
-      if (event.key.toLowerCase() !== 's' || event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-      if (event.target.closest?.('input, select, textarea')) return;
-      const button = event.shiftKey && !$('stop-all').hidden ? $('stop-all') : $('stop');
-      if (!button.hidden) button.click();
-    });
   }
 
   // Buttons: label, action, its fields from the form's, another form that it reads, too, what is asked before. The Enter key in a field is the first button.

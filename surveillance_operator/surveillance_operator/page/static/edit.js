@@ -1,9 +1,12 @@
 // The place's editor: draws what the server knows of the place, and sends what a person wants of it.
 // What a change means, and whether it may be, is decided by the server.
 import {$, h, s, act, ask, names} from './dom.js';
+import {startHead} from './head.js';
 
 const may = document.documentElement.dataset.edit === '1';
-$('live-link').hidden = document.documentElement.dataset.live !== '1';
+const {live, control, guard} = document.documentElement.dataset;
+$('live-link').hidden = live !== '1';
+if (live === '1') startHead({control: control === '1', guard: guard === '1'});
 const TOOLS = {
   select: ['Select', 'v', 'Tap a room, a door or a zone; drag its handle to move it; drag the floor to look around. Dashed doors are doubtful.'],
   cut: ['Cut', 'c', 'Draw a line through a room, or tap its two ends. It is carried on to the walls.'],

@@ -249,7 +249,7 @@ $('people-link').hidden = root.dataset.people !== '1';
 $('rule').hidden = !may || root.dataset.rules !== '1';
 present();
 connect();
-setInterval(() => { listen(); alarms.tick(); if (!past) map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
+setInterval(() => { listen(); alarms.bar.tick(); if (!past) map.tick(state, now()); drawStrips($('strips'), state, now()); }, 1000);
 setInterval(camera, 700);
 if (root.dataset.past === '1') new Shift({wall, past: lookBack, choose: (event) => { open('events'); search.show(event); }});
 if (may && !replaying) {

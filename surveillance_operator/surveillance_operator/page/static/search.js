@@ -1,6 +1,7 @@
 // The events of all that was recorded: searched by words, time, place, kind, severity, state; one in detail; what is muted.
 import {$, h, act, ask} from './dom.js';
-import {buttons, facts, film, headline, level, moment, pictures, said, stateName} from './alarms.js';
+import {buttons, facts, film, level, moment, pictures, said, stateName} from './alarms.js';
+import {headline} from './head.js';
 import {open, typing, whenShown} from './views.js';
 
 const PAGE = 100;

@@ -1,6 +1,7 @@
 // The timeline of the shift: a mark for each event, and a slider that shows the page as it was.
 import {$, h, s, ask, shown, timeOfDay} from './dom.js';
-import {headline, level} from './alarms.js';
+import {level} from './alarms.js';
+import {headline} from './head.js';
 
 const PERIOD = 10000;
 const MOST = 1000;
