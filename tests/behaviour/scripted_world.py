@@ -207,6 +207,9 @@ class World:
     def reachable(self, interrupt: Interrupt) -> frozenset[str]:
         return frozenset(self.neighbours(self.is_in))
 
+    def record_coverage(self, covered: Mapping[str, int], interrupt: Interrupt) -> None:
+        self._call('record_coverage', interrupt)
+
     def await_place(self, place: str, seconds: float, interrupt: Interrupt) -> str:
         return '' if self.seen_at else self.is_in
 

@@ -71,8 +71,8 @@ def swept_mission(
     world: World, port: ScriptedSweep, record: MissionRecord | None = None, **choice: object
 ) -> Mission:
     world.told = []  # type: ignore[attr-defined]
-    world.record_coverage = (  # type: ignore[attr-defined]
-        lambda percent, interrupt: world.told.append(dict(percent))  # type: ignore[attr-defined]
+    world.record_coverage = (  # type: ignore[method-assign]
+        lambda covered, interrupt: world.told.append(dict(covered))  # type: ignore[attr-defined]
     )
     mission = world.mission(settings(**choice), record)
     mission.ports = replace(mission.ports, sweeping=port)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from state_machines import Interrupt
-from state_machines.ros import GoalEnd
+from state_machines.ros import GoalEnd, GoalRun
 from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion import nav2_goals
 from surveillance_runtime.node import PatrolNode
@@ -83,11 +83,11 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Servers:
     return servers
 
 
-class Run:
+class Run(GoalRun):
     """A goal's run whose time passes when somebody sleeps."""
 
     def __init__(self) -> None:
-        self.interrupt = Interrupt()
+        self.interrupt, self.cancelled = Interrupt(), False
         self.time = 0.0
         self.pauses: list[float] = []
 

@@ -40,6 +40,9 @@ class Drive:
         self.pose = (float(path[-1][0]), float(path[-1][1]), 0.0)
         return path[-1]
 
+    def place_reached(self, goal: Any, end: Any) -> str:
+        raise AssertionError('a drive to a dock asks for no place')
+
     def look_around(self, run: Any) -> None:
         self.looked += 1
 
@@ -52,8 +55,8 @@ class Docked:
         self.drive = Drive(servers, self.node, at)
         given: dict[str, Any] = {'dock_type': 'charger', 'navigator': 'nav2', 'peer_timeout': 60.0}
         stations = {'C2': Station((90.0, 0.0, 0.0)), 'E': Station(DOCK)}
-        settings = MotionSettings(stations=stations, **(given | settings))
-        self.motion = docking_motion.DockingMotion(self.node, self.drive, settings)
+        asked = MotionSettings(stations=stations, **(given | settings))
+        self.motion = docking_motion.DockingMotion(self.node, self.drive, asked)
         self.run = Run()
 
     def charges(self, status: int) -> None:

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def test_a_hall_is_swept_and_then_again(tmp_path: Path) -> None:
     write_map(tmp_path / 'map.yaml', arena(), 0.05, (-1.0, -1.0, 0.0))
     import_place(ImportRequest(tmp_path / 'map.yaml', tmp_path / 'place.yaml'))
     record = tmp_path / 'events.jsonl'
-    own = {
+    own: dict[str, dict[str, Any]] = {
         'robot_behavior': {
             'record': str(record),
             'coverage.range': 1.5,
