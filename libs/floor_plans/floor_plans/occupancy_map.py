@@ -178,7 +178,7 @@ def read_map(
                 'metres (map_file_resolution; import: --resolution), or the map.yaml beside it'
             )
         return _made(path, path, resolution, tuple(origin) or (0.0, 0.0, 0.0), _Reading())
-    if path.is_file() and (kind := _kind_of(path)):
+    if os.path.isfile(path) and (kind := _kind_of(path)):
         raise FileError(f'{path}: {kind}: expected a map.yaml, or a picture such as PNG')
     if resolution is not None or origin:
         raise FileError(f'{path}: says its own resolution and origin: expected them for a picture')
@@ -210,13 +210,13 @@ def _found_picture(file: YamlFile, image: str) -> Path:
     name = image.replace('\\', '/').rstrip('/').rpartition('/')[2]
     beside = file.path.parent / name
     for tried in (named, Path(os.path.expanduser(image)), beside):
-        if tried.is_file():
+        if os.path.isfile(tried):  # False for a name that is too long, too
             return tried
     there = _pictures_in(file.path.parent)
     same = [each for each in there if each.stem.casefold() == beside.stem.casefold()]
     if len(same) == 1:
         return same[0]
-    if named.exists():
+    if os.path.exists(named):
         return named  # a folder or a device: reading it says so
     listed = ', '.join(each.name for each in (same or there)[:_MOST_LISTED])
     found = f'the pictures there are {listed}' if listed else 'there is no picture'
@@ -226,7 +226,9 @@ def _found_picture(file: YamlFile, image: str) -> Path:
 
 def _pictures_in(folder: Path) -> list[Path]:
     try:
-        return sorted(each for each in folder.iterdir() if is_picture(each) and each.is_file())
+        return sorted(
+            each for each in folder.iterdir() if is_picture(each) and os.path.isfile(each)
+        )
     except OSError:
         return []
 

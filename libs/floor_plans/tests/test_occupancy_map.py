@@ -256,3 +256,10 @@ def test_a_file_that_is_no_map_is_told_by_what_it_is(tmp_path: Path) -> None:
     archive.write_bytes(b'PK\x03\x04' + bytes(60))
     with pytest.raises(FileError, match=r'maps.zip: a zip archive: expected a map.yaml, or a pic'):
         read_map(archive)
+
+
+def test_a_picture_whose_name_is_too_long_for_a_file_is_told_as_missing(tmp_path: Path) -> None:
+    path = tmp_path / 'map.yaml'
+    path.write_text(f'image: {"x" * 300}.png\nresolution: 0.05\norigin: [0, 0, 0]\n')
+    with pytest.raises(FileError, match='no such file'):
+        read_map(path)

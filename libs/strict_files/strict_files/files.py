@@ -42,7 +42,9 @@ def in_one_line(error: OSError) -> str:
 
 def like_file(path: Path) -> str:
     """Return the path that is most like one that is not there; empty where none is like it."""
-    missing = next((each for each in reversed([path, *path.parents]) if not each.exists()), None)
+    # os.path says False for a name that is too long, where a Path raises.
+    chain = reversed([path, *path.parents])
+    missing = next((each for each in chain if not os.path.exists(each)), None)
     if missing is None:
         return ''
     with contextlib.suppress(OSError):
@@ -54,7 +56,7 @@ def like_file(path: Path) -> str:
         if name := stems.get(like(missing.stem, list(stems))):
             likely = missing.with_name(name)
             whole = likely / path.relative_to(missing)
-            return str(whole if whole.exists() else likely)
+            return str(whole if os.path.exists(whole) else likely)
     return ''
 
 
