@@ -174,8 +174,10 @@ def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> tuple[list[
     motion, before = mission.ports.motion, mission.place
     assert motion is not None
     _, goal = mission.goal(place, interrupt)
-    sweeping = mission.ports.sweeping
-    here = None if sweeping is None else sweeping.position()
+    sweeping, here = mission.ports.sweeping, None
+    # Where a sweep or a look moved it about, the last path's end is not where it stands.
+    if sweeping is not None and (mission.ports.looking or sweeping.is_swept(before)):
+        here = sweeping.position()
     start = here or motion.last_position() or mission.ports.places.position(before, interrupt)
     path: list[Point] = []
     for stop in _stops(mission, place, goal, interrupt):
