@@ -46,7 +46,8 @@ class Outcome:
 
 def main(names: list[str]) -> int:
     """Start the scripts, print a line for each, and return the exit code."""
-    scripts = names or [path.name for path in (CHECKOUT / 'benchmarks').glob('**/*.py')]
+    folder = CHECKOUT / 'benchmarks'
+    scripts = names or [str(path.relative_to(folder)) for path in folder.glob('**/*.py')]
     found = [name for name in scripts if OTHERS.get(name, []) is not None and is_command(name)]
     found.sort(key=lambda name: (LONG.index(name) if name in LONG else len(LONG), name))
     begun, failed = time.monotonic(), []
