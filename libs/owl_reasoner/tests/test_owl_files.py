@@ -101,7 +101,11 @@ def test_datatypes_are_kept_exactly() -> None:
         (b'<?xml version="1.0" encoding="UTF-99"?><a/>', 1, 'unknown encoding: UTF-99'),
         (b'<?xml version="1.0" encoding="rot13"?><a/>', 1, 'encoding cannot be read'),
         (document('<owl:Class xml:base="http://[x" rdf:about="b"/>'), 2, 'Invalid IPv6 URL'),
-        (b'hello world', 1, 'expected RDF/XML, OWL/XML, Turtle, N-Triples, JSON-LD, OWL func'),
+        (
+            b'hello world',
+            1,
+            'expected RDF/XML, OWL/XML, Turtle, N-Triples, N-Quads, JSON-LD, OWL func',
+        ),
         (b'<a:b> <a:c> <a:d> .\n<a:b> <a:c> .', 2, 'N-Triples'),
         (document('<owl:Class rdf:about="#A">\n<owl:Class>'), 4, 'mismatched tag'),
         (document('<owl:Class rdf:about="#A">\nstray</owl:Class>'), 3, "text 'stray'"),
