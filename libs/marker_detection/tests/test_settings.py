@@ -26,7 +26,13 @@ NUMBERS = {
     'unknown_frames': (4, 1, 100),
 }
 """Default and bounds of each setting that has some."""
-OTHERS = {'dictionary': 'DICT_5X5_100', 'windows': (15, 31, 5), 'known_ids': [], 'sizes': []}
+OTHERS = {
+    'dictionary': 'DICT_5X5_100',
+    'windows': (15, 31, 5),
+    'known_ids': [],
+    'sizes': [],
+    'inverted': False,
+}
 
 
 def declared():
