@@ -11,6 +11,7 @@ import pytest
 from state_machines import Interrupt
 from state_machines.exceptions import CallError, CallInterruptedError
 from surveillance_behaviour.machines import MACHINES
+from surveillance_behaviour.machines.surveillance_machine import drive
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.mission_log import MissionRecord, summarize
 from surveillance_behaviour.mission.sweeping import MOST_FAILURES, PlaceSweep
@@ -32,6 +33,7 @@ class ScriptedSweep:
         self.ended: list[float | None] = []
         self.blocked: set[float] = set()
         self.is_known = True
+        self.stands_at: Point | None = None
 
     def is_swept(self, place: str) -> bool:
         return place in self.swept
@@ -57,7 +59,7 @@ class ScriptedSweep:
             raise CallError('compute_path: the goal was aborted')
 
     def position(self) -> Point | None:
-        return None
+        return self.stands_at
 
     def end(self, seconds: float | None) -> tuple[float, float]:
         self.ended.append(seconds)
@@ -120,6 +122,27 @@ def test_a_place_among_others_is_swept_where_that_is_asked_and_for_what_is_old()
     PlaceSweep(mission).run(Interrupt())
     assert port.since == [100.0 - 60.0 / 2]
     assert not mission.dock.is_docked
+
+
+@pytest.mark.parametrize(
+    ('rooms', 'swept', 'begins'),
+    [
+        ({'E': ['D6']}, (), (4.0, 0.0, 0.0)),
+        ({'E': ['D6'], 'R1': ['D6']}, ('E',), (4.0, 0.0, 0.0)),
+        # A stranger's pose begins no path where nothing moved the robot about.
+        ({'E': ['D6'], 'R1': ['D6']}, (), (0.5, 0.0, 0.0)),
+    ],
+)
+def test_after_a_sweep_a_path_begins_where_it_left_the_robot(
+    rooms: dict[str, list[str]], swept: tuple[str, ...], begins: Point
+) -> None:
+    positions = {'E': (0.0, 0.0, 0.0), 'R1': (9.0, 0.0, 0.0)}
+    world = World(rooms=rooms, positions={name: positions[name] for name in rooms})
+    port = ScriptedSweep(world, swept)
+    mission = swept_mission(world, port)
+    world.at, port.stands_at = (0.5, 0.0, 0.0), (4.0, 0.0, 0.0)
+    path, _ = drive(mission, next(reversed(rooms)), Interrupt())
+    assert path[0] == begins
 
 
 def test_a_stop_that_cannot_be_reached_is_left_out_and_told_once(hall: World) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -66,9 +67,14 @@ def test_a_hall_is_swept_and_then_again(tmp_path: Path) -> None:
     try:
         stack.start()
         until(stack, lambda: entries('decision') and told and told[-1].places)
-        until(stack, lambda: whole() and told[-1].places[0].share >= 0.95)
+        until(stack, lambda: whole() and entries('visit') and told[-1].places[0].share >= 0.95)
     finally:
         stack.close()
+    assert not entries('failure'), entries('failure')
     assert int(str(whole()[0]['stops'])) >= 2
+    # The next path begins where the sweep has left the robot.
+    (first, *_) = entries('visit')
+    path, driven = cast('Any', first['path']), cast('Any', first['driven'])
+    assert math.dist(path[0], driven[0]) < 0.5
     assert {entry['rule'] for entry in entries('decision')} == {'sweep'}
     assert 14.0 < told[-1].places[0].area < 18.0

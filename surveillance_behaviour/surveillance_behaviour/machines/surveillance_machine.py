@@ -24,6 +24,7 @@ from surveillance_behaviour.machines.shared_states import (
 from surveillance_behaviour.mission.looking import RoomInspection
 from surveillance_behaviour.mission.mission import Mission
 from surveillance_behaviour.mission.recovery import Step
+from surveillance_behaviour.mission.sweeping import is_swept
 from surveillance_behaviour.ports import Point
 
 
@@ -176,7 +177,7 @@ def drive(mission: Mission, place: str, interrupt: fsm.Interrupt) -> tuple[list[
     _, goal = mission.goal(place, interrupt)
     sweeping, here = mission.ports.sweeping, None
     # Where a sweep or a look moved it about, the last path's end is not where it stands.
-    if sweeping is not None and (mission.ports.looking or sweeping.is_swept(before)):
+    if sweeping is not None and (mission.ports.looking or is_swept(mission, before)):
         here = sweeping.position()
     start = here or motion.last_position() or mission.ports.places.position(before, interrupt)
     path: list[Point] = []

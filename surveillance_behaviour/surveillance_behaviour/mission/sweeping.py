@@ -17,6 +17,12 @@ MOST_FAILURES = 3
 """After so many stops in a row that could not be reached a sweep ends."""
 
 
+def is_swept(mission: Mission, place: str) -> bool:
+    """Tell whether a visit is to cover all of a place: one that is listed, or the only one."""
+    port = mission.ports.sweeping
+    return port is not None and (port.is_swept(place) or mission.ports.reasoner.places == {place})
+
+
 class PlaceSweep:
     """Sweeps places of a mission.
 
@@ -42,8 +48,8 @@ class PlaceSweep:
         if port is None:
             return
         place = mission.place
-        is_only = mission.ports.reasoner.places == {place}
-        if is_only or port.is_swept(place):
+        if is_swept(mission, place):
+            is_only = mission.ports.reasoner.places == {place}
             rest = 0.0 if is_only else port.threshold(place) / 2.0
             self._sweep(port, place, mission.now() - rest, interrupt)
         try:
