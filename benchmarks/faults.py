@@ -158,7 +158,10 @@ class Mission:
 
     def launch(self, words: Sequence[str]) -> Launcher:
         """Start the launcher."""
-        environ = {'XDG_STATE_HOME': str(self.state)}
+        # A stop of these robots stays theirs, on the disk and in memory.
+        memory = self.state.with_name(f'{self.state.name}_memory')
+        memory.mkdir(parents=True, exist_ok=True)
+        environ = {'XDG_STATE_HOME': str(self.state), 'XDG_RUNTIME_DIR': str(memory)}
         return Launcher(words, self.domain, self.folder / 'launch.log', environ, self._on)
 
     def speed(self) -> float:
@@ -549,7 +552,7 @@ def callbacks(chosen: Chosen) -> list[Row]:
     """Call everything that a patrol's nodes take with strange values."""
     before = os.getcwd()
     folder = tempfile.mkdtemp(prefix='faults-')
-    os.environ['XDG_STATE_HOME'] = folder
+    os.environ['XDG_STATE_HOME'] = os.environ['XDG_RUNTIME_DIR'] = folder
     os.chdir(folder)
     stack = Stack(ROOT / 'config' / 'seven_rooms.yaml')
     costs: list[Cost] = []

@@ -504,7 +504,8 @@ def resumed_missions(count: int, generator: np.random.Generator) -> list[str]:
     faults = []
     with tempfile.TemporaryDirectory(prefix='hostile-') as name:
         runs = Path(name, 'runs')
-        environ = {**os.environ, 'XDG_STATE_HOME': str(Path(name, 'state'))}
+        own = {'XDG_STATE_HOME': str(Path(name, 'state')), 'XDG_RUNTIME_DIR': name}
+        environ = {**os.environ, **own}
         _launch(runs, environ, ['--for', LONG])
         (first,) = runs.iterdir()
         keep = Path(name, 'keep')

@@ -11,6 +11,7 @@ import contextlib
 import json
 import os
 import re
+import stat
 import tempfile
 import time
 from collections.abc import Mapping
@@ -67,8 +68,24 @@ def own_stop(domain: int, namespace: str, environ: Mapping[str, str]) -> StopFil
     file = own_file(domain, namespace, environ)
     memory = environ.get('XDG_RUNTIME_DIR') or f'/run/user/{os.getuid()}'
     if not os.path.isdir(memory):
+        # Its name is known to all users of the machine: one of them may have made it.
         memory = os.path.join(tempfile.gettempdir(), f'surveillance_{os.getuid()}')
+        if not _is_private(Path(memory)):
+            return StopFile(file)
     return StopFile(file, Path(memory, 'surveillance', file.name))
+
+
+def _is_private(folder: Path) -> bool:
+    """Make a folder that nobody else may write into; tell whether it is one."""
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        return (
+            stat.S_ISDIR(found.st_mode)
+            and found.st_uid == os.getuid()
+            and (not stat.S_IMODE(found.st_mode) & 0o022)
+        )
+    return False
 
 
 def own_file(domain: int, namespace: str, environ: Mapping[str, str]) -> Path:

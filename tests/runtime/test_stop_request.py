@@ -160,3 +160,20 @@ def test_memory_is_the_user_s(tmp_path: Path) -> None:
     assert kept.spare == tmp_path / 'surveillance' / 'stop_3_a.json'
     elsewhere = own_stop(3, '/a', {**state, 'XDG_RUNTIME_DIR': str(tmp_path / 'none')})
     assert elsewhere.spare is not None
+
+
+def test_memory_that_others_may_write_into_keeps_no_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Who may write there may remove the stop, or set one that nobody can release.
+    monkeypatch.setattr('tempfile.tempdir', str(tmp_path))
+    environ = {'XDG_STATE_HOME': str(tmp_path / 'state'), 'XDG_RUNTIME_DIR': str(tmp_path / 'no')}
+    folder = tmp_path / f'surveillance_{os.getuid()}'
+    assert own_stop(3, '/a', environ).spare is not None
+    assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(0o777)
+    assert own_stop(3, '/a', environ).spare is None
+    folder.rmdir()
+    (tmp_path / 'theirs').mkdir(mode=0o700)
+    folder.symlink_to(tmp_path / 'theirs')
+    assert own_stop(3, '/a', environ).spare is None
