@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import itertools
 import os
 import socket
 import struct
@@ -31,6 +32,8 @@ _SHARED = (0, 1)
 _EMPTY_MESSAGE = b'RTPS\x02\x03\x00\x00' + bytes(12)
 _PIDFD_GETFD = 438
 _MOST_NAMED = 5
+_MOST_TAKEN, _MOST_SENDERS = 1000, 20
+"""Bounds of looking who sends: whoever floods a socket does not hold the watcher."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +166,8 @@ class ReceiveQueues:
         """Return who else than this launch has sent what waits in a socket of a lost process."""
         others = set()
         mine = {self._sender.getsockname()[1]}
-        sources = set(_drained(pid, self._descriptors(pid).get(inode)))
+        taken = itertools.islice(_drained(pid, self._descriptors(pid).get(inode)), _MOST_TAKEN)
+        sources = sorted(set(taken))[:_MOST_SENDERS]
         ports = {each.port: number for number, each in self._sockets().items()}
         for address, port in sources:
             if not address.startswith('127.'):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
 import socket
 import struct
+import subprocess
 import sys
 
 import pytest
@@ -105,3 +108,29 @@ def test_a_node_whose_receiving_threads_stand_is_started_again(start, ros_domain
     finally:
         frozen.close()
     assert launch.end(signal.SIGINT)[0] == 0
+
+
+def test_who_else_sends_to_a_deaf_process_is_named() -> None:
+    flood = (
+        'import socket, sys\n'
+        'out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)\n'
+        "for _ in range(500): out.sendto(b'x', ('127.0.0.1', int(sys.argv[1])))\n"
+        "print('sent', flush=True)\n"
+        'sys.stdin.read()\n'
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
+        for port in range(7400 + 250 * 99 + 10, 7400 + 250 * 100):
+            with contextlib.suppress(OSError):
+                deaf.bind(('127.0.0.1', port))
+                break
+        watch, here = ReceiveQueues(99), os.getpid()
+        words = [sys.executable, '-c', flood, str(deaf.getsockname()[1])]
+        with subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as stranger:
+            assert stranger.stdout is not None
+            assert stranger.stdout.readline() == 'sent\n'
+            assert not watch.look([here], 0.0)
+            text = watch.look([here], DEAF_AFTER)[here]
+            stranger.communicate('')
+    assert f'; besides this launch there sends process {stranger.pid} (' in text
