@@ -35,3 +35,15 @@ def test_a_link_that_cannot_be_made_says_why(name: str, role: str, expected: str
 def test_a_guard_stops_one_robot_or_all_and_lets_none_go_on() -> None:
     assert least_role('fleet', {'word': 'stop'}) == least_role('stop', {}) == 'guard'
     assert least_role('fleet', {'word': 'go'}) == least_role('machine', {}) == 'operator'
+
+
+def test_a_damaged_file_lets_nobody_in_and_is_kept_when_another_is_written(tmp_path: Path) -> None:
+    path = tmp_path / 'links.json'
+    token = Links(path).make('Anna', 'guard')
+    whole = path.read_text()
+    path.write_text(whole[:-20])
+    links = Links(path)
+    assert links.person(token) is None
+    new = links.make('Bert', 'viewer')
+    assert links.person(new) is not None
+    assert (tmp_path / 'links.json.unread').read_text() == whole[:-20]

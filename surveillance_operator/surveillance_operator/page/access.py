@@ -163,7 +163,7 @@ class Links:
         lock = os.open(f'{self._path}.lock', os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            links = list(self._now())
+            links = list(_kept_in(self._path))
             yield links
             part = f'{self._path}.part'
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC | os.O_NOFOLLOW
@@ -172,6 +172,22 @@ class Links:
             os.replace(part, self._path)
         finally:
             os.close(lock)
+
+
+def _kept_in(path: Path) -> tuple[Link, ...]:
+    """Return the links of a file that is written next; one that cannot be read is put aside, as
+    `NAME.unread`.
+
+    Raises:
+        OSError: It is there and nobody may read it.
+    """
+    try:
+        return _links_in(path)
+    except FileNotFoundError:
+        return ()
+    except (ValueError, KeyError, TypeError):
+        os.replace(path, f'{path}.unread')
+        return ()
 
 
 def _links_in(path: Path) -> tuple[Link, ...]:
