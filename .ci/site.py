@@ -25,15 +25,15 @@ from launcher.environment import LIBRARIES, PACKAGES  # noqa: E402
 
 SITE = CHECKOUT / 'build' / 'site'
 TOOLS = ['mkdocs-material>=9.5,<10', 'mkdocstrings[python]>=0.26,<2']
-START = {
-    'index.md': 'Start',
-    'tutorial.md': 'Tutorial',
-    'your_building.md': 'Your building',
-    'your_robot.md': 'Your robot',
-    'your_robot_has_nav2.md': 'Your robot has Nav2',
+SECTIONS = {
+    'Start': ('tutorial',),
+    'How to': ('how-to',),
+    'Reference': ('reference', 'api'),
+    'Explanation': ('explanation',),
+    'Libraries': ('libraries',),
+    'Project': ('project',),
 }
-HOW_TO = ('running', 'explore', 'watching', 'fleet', 'long_runs', 'operator', 'security')
-FROM = ('from_armor', 'from_smach', 'from_yasmin', 'from_patrolling_sim')
+"""The folders of each section."""
 CONFIG = """\
 site_name: Surveillance robot
 docs_dir: pages
@@ -84,14 +84,14 @@ def main() -> int:
     shutil.rmtree(SITE / 'pages', ignore_errors=True)
     pages = SITE / 'pages'
     moved = gather(pages)
-    references = reference(pages)
+    reference(pages)
     for path in pages.rglob('*.md'):
         text = path.read_text(encoding='utf-8')
         path.write_text(relinked(text, path.relative_to(pages), moved), encoding='utf-8')
     paths = ', '.join(
         str(CHECKOUT / folder) for folder in (*(f'libs/{name}' for name in LIBRARIES), *PACKAGES)
     )
-    config = CONFIG.format(paths=paths, nav=navigation(pages, references))
+    config = CONFIG.format(paths=paths, nav=navigation(pages))
     (SITE / 'mkdocs.yml').write_text(config, encoding='utf-8')
     python = SITE / 'venv' / 'bin' / 'python'
     if not python.exists():
@@ -108,13 +108,17 @@ def main() -> int:
 
 def gather(pages: Path) -> dict[str, str]:
     """Copy what people read; return where each file of the checkout stands in the site."""
-    wanted = {f'docs/{path.name}': path.name for path in (CHECKOUT / 'docs').glob('*.md')}
-    wanted |= {'README.md': 'index.md', 'CONTRIBUTING.md': 'contributing.md'}
-    wanted |= {'CHANGELOG.md': 'changelog.md', 'examples/README.md': 'examples.md'}
-    wanted |= {'SECURITY.md': 'report_a_weakness.md', 'CODE_OF_CONDUCT.md': 'conduct.md'}
+    docs = CHECKOUT / 'docs'
+    wanted = {
+        f'docs/{page.relative_to(docs)}': f'{page.relative_to(docs)}' for page in docs.rglob('*.md')
+    }
+    wanted |= {'README.md': 'index.md', 'CONTRIBUTING.md': 'project/contributing.md'}
+    wanted |= {'CHANGELOG.md': 'project/changelog.md', 'examples/README.md': 'how-to/examples.md'}
+    wanted |= {'SECURITY.md': 'project/report_a_weakness.md'}
+    wanted |= {'CODE_OF_CONDUCT.md': 'project/conduct.md'}
     wanted |= {f'libs/{name}/README.md': f'libraries/{name}.md' for name in LIBRARIES}
-    for folder in ('images', 'proxy', 'nav2'):
-        for path in sorted((CHECKOUT / 'docs' / folder).glob('*')):
+    for folder in ('images', 'proxy'):
+        for path in sorted((docs / folder).glob('*')):
             wanted[f'docs/{folder}/{path.name}'] = f'{folder}/{path.name}'
     for source, target in wanted.items():
         if (CHECKOUT / source).is_file():
@@ -144,42 +148,32 @@ def relinked(text: str, page: Path, moved: dict[str, str]) -> str:
     return re.sub(r'(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)', turned, text)
 
 
-def reference(pages: Path) -> dict[str, list[str]]:
-    """Write a page for each package with its public modules; return the pages by floor."""
-    found: dict[str, list[str]] = {'Libraries': [], 'The robot': []}
-    (pages / 'reference').mkdir(parents=True, exist_ok=True)
-    for floor, names in (('Libraries', LIBRARIES), ('The robot', PACKAGES)):
+def reference(pages: Path) -> None:
+    """Write a page for each package with its public modules."""
+    (pages / 'api').mkdir(parents=True, exist_ok=True)
+    for names in (LIBRARIES, PACKAGES):
         for name in names:
-            folder = CHECKOUT / ('libs' if floor == 'Libraries' else '') / name / name
+            folder = CHECKOUT / ('libs' if names is LIBRARIES else '') / name / name
             modules = sorted(
                 '.'.join([name, *path.relative_to(folder).with_suffix('').parts])
                 for path in folder.rglob('*.py')
                 if not any(part.startswith('_') for part in path.relative_to(folder).parts)
-                and (floor == 'Libraries' or not path.stem.endswith('_node'))
+                and (names is LIBRARIES or not path.stem.endswith('_node'))
             )
             lines = [f'# {name}', '', f'::: {name}', '    options:', '      members: false', '']
             for module in modules:
                 lines += [f'::: {module}', '']
-            (pages / 'reference' / f'{name}.md').write_text('\n'.join(lines), encoding='utf-8')
-            found[floor].append(f'reference/{name}.md')
-    return found
+            (pages / 'api' / f'{name}.md').write_text('\n'.join(lines), encoding='utf-8')
 
 
-def navigation(pages: Path, references: dict[str, list[str]]) -> str:
+def navigation(pages: Path) -> str:
     """Return the tree of pages as YAML."""
-    there = {path.relative_to(pages).as_posix() for path in pages.rglob('*.md')}
-    sections: dict[str, list[str]] = {
-        'Start': [name for name in START if name in there],
-        'How to': [f'{name}.md' for name in HOW_TO if f'{name}.md' in there],
-        'Coming from elsewhere': [f'{name}.md' for name in FROM if f'{name}.md' in there],
-    }
-    told = {page for pages_of in sections.values() for page in pages_of}
-    sections['Libraries'] = sorted(page for page in there if page.startswith('libraries/'))
-    sections['Explanation'] = sorted(page for page in there if '/' not in page and page not in told)
-    sections['Reference'] = [page for pages_of in references.values() for page in pages_of]
-    lines = []
-    for title, names in sections.items():
-        lines += [f'  - {title}:', *(f'      - {name}' for name in names)]
+    lines = ['  - Front: index.md']
+    for title, folders in SECTIONS.items():
+        lines.append(f'  - {title}:')
+        for folder in folders:
+            names = sorted(page.name for page in (pages / folder).glob('*.md'))
+            lines += [f'      - {folder}/{name}' for name in names]
     return '\n'.join(lines)
 
 

@@ -1,7 +1,7 @@
 """A fleet on hosts of its own, with links that are cut, lose and delay, and hosts that go down.
 
 Used by `fleet.py --hosts`. Each host is a network namespace (`hosts`). Its programs are started by
-`launch.py` as docs/fleet.md shows it, and find the others by DDS over the links between the hosts.
+`launch.py` as docs/how-to/fleet.md shows it, and find the others by DDS over the links.
 The simulated world stands for what is real around the robots: its links never fail. The ontology
 has a host, and so has each robot.
 

@@ -2,8 +2,9 @@
 
 .venv/bin/python benchmarks/persons.py --with FOLDER_OR_PICTURE ... --without FOLDER_OR_PICTURE ...
 
-Of 1,486 photographs that were looked at by eye (docs/watching.md), most are of these repositories
-on GitHub, and none is kept here: EliSchwartz/imagenet-sample-images, dusty-nv/jetson-inference,
+Of 1,486 photographs that were looked at by eye (docs/reference/measurements.md), most are of these
+repositories on GitHub, and none is kept here: EliSchwartz/imagenet-sample-images,
+dusty-nv/jetson-inference,
 open-mmlab/mmpose, magicleap/SuperGluePretrainedNetwork, zillow/zind (perspective views of its
 panoramas), EPFL-VILAB/omnidata, baegwangbin/DSINE, ialhashim/DenseDepth, tensorflow/tfjs-models,
 CMU-Perceptual-Computing-Lab/openpose, ildoonet/tf-pose-estimation and xingyizhou/CenterNet.

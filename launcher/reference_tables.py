@@ -2,7 +2,7 @@
 
 `survey` makes each node once, in each mode and behaviour, and notes what it declares and offers.
 `write` makes of this the schema that `surveillance_runtime.configuration` checks with,
-docs/parameters.md, docs/interfaces.md and docs/alarms.md; `show` prints parameters for
+and the pages parameters, interfaces and alarms of docs/reference; `show` prints parameters for
 `launch.py params`.
 """
 
@@ -61,15 +61,16 @@ _INTERFACES = """\
 
 All topics, services and actions, written by `python3 launch.py params --write` from the nodes
 themselves; a test compares. The fields of the types, with units, stand in
-[surveillance_interfaces](../surveillance_interfaces), ARMOR's directives in [armor.md](armor.md).
+[surveillance_interfaces](../../surveillance_interfaces), ARMOR's directives in
+[Directives](directives.md).
 
 - Names are relative, so `--namespace robot2` gives a second robot. A name that begins with a slash
   is the same for all robots.
 - *Latched* topics are reliable and transient_local: a late subscriber gets the last message. Most
   are state topics: their owner repeats them and answers whoever else publishes them
-  ([architecture.md](architecture.md#threads-and-time)). `state/battery_low` is published on change
-  only; `battery_low` is the same, repeated.
-- Each node publishes its health on `/diagnostics` ([long_runs.md](long_runs.md#health)).
+  ([Architecture](../explanation/architecture.md#threads-and-time)). `state/battery_low` is
+  published on change only; `battery_low` is the same, repeated.
+- Each node publishes its health on `/diagnostics` ([Long runs](../how-to/long_runs.md#health)).
 - A node that calls `ontology_map/reference_name` uses the ontology after that: it calls
   `armor_interface_srv` or `armor_interface_serialized_srv`, and some subscribe `fact_changes`. Only
   `initial_state` just waits for the map.
@@ -273,7 +274,7 @@ def _row(spec: ParameterSpec) -> dict[str, Any]:
 
 
 def interfaces_page(found: NodeSurvey) -> str:
-    """Return the page docs/interfaces.md."""
+    """Return the page docs/reference/interfaces.md."""
     parts = [_INTERFACES]
     for title, head, interfaces in (
         ('Topics', ('published by', 'subscribed by'), found.topics),
@@ -309,7 +310,7 @@ def as_json(tables: Mapping[str, Any]) -> str:
 
 
 def parameters_page(schema: Mapping[str, NodeSchema]) -> str:
-    """Return the page docs/parameters.md."""
+    """Return the page docs/reference/parameters.md."""
     parts = [_PARAMETERS]
     for node in node_table.NODES:
         table = schema[node.name]
@@ -348,9 +349,13 @@ def write(checkout: Path) -> list[Path]:
         'alarms.md': alarms.page(),
     }
     for name, text in pages.items():
-        (checkout / 'docs' / name).write_text(text, encoding='utf-8')
+        (checkout / 'docs' / 'reference' / name).write_text(text, encoding='utf-8')
     package_commands.HELP.write_text(as_json(package_commands.all_helps()), encoding='utf-8')
-    return [SCHEMA, *(checkout / 'docs' / name for name in pages), package_commands.HELP]
+    return [
+        SCHEMA,
+        *(checkout / 'docs' / 'reference' / name for name in pages),
+        package_commands.HELP,
+    ]
 
 
 Printer = Callable[[str], None]

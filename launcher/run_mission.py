@@ -134,7 +134,8 @@ def run_mission(
     for old in deleted:
         log.say(f'deleted {_short(old)}: the runs take more than --keep {run.keep:g} GB')
     if run.network not in ('', LOCALHOST):
-        log.say(f'--network {run.network}: nodes of other machines may be heard, docs/security.md')
+        heard = 'nodes of other machines may be heard, docs/how-to/secure.md'
+        log.say(f'--network {run.network}: {heard}')
     for line in stopped_ones(run, team, os.environ):
         log.warn(line)
     log.say(f'watch it in a second terminal: {watch_command(run)}')

@@ -13,7 +13,7 @@ import yaml
 from surveillance_runtime.profile import read_profile
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / 'docs' / 'your_robot_has_nav2.md').read_text('utf-8')
+PAGE = (ROOT / 'docs' / 'how-to' / 'nav2.md').read_text('utf-8')
 SOURCES = '\n'.join(
     path.read_text('utf-8')
     for package in ('surveillance_controllers', 'surveillance_runtime', 'surveillance_operator')

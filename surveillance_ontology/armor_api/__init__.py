@@ -8,7 +8,7 @@
 
 A client owns the node and the thread that it needs: a script calls neither ``rclpy.init`` nor
 ``spin``. A node that is spun anyway uses `surveillance_ontology.armor_client.ArmorClient`, whose
-methods can be awaited in its callbacks. docs/from_armor.md says what changes in a program.
+methods can be awaited in its callbacks. docs/how-to/from_armor.md says what changes in a program.
 """
 
 from armor_api.armor_client import ArmorClient

@@ -7,8 +7,8 @@ it must hold before it is told, and an **off-delay** for which it must have been
 returned to normal. `Incidents` keeps the delays of this table, for all nodes alike; the bounds are
 those of whoever measures, who takes them from here where they are numbers of its own.
 
-`docs/alarms.md` is written from this table (``launch.py params --write``). A kind of a node of your
-own, which is not in it, begins and ends at once.
+`docs/reference/alarms.md` is written from this table (``launch.py params --write``). A kind of a
+node of your own, which is not in it, begins and ends at once.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def is_known(kind: str) -> bool:
 
 
 def page() -> str:
-    """Return `docs/alarms.md`."""
+    """Return `docs/reference/alarms.md`."""
     return '\n'.join([*_HEAD, *_rows()]) + '\n'
 
 
@@ -231,10 +231,10 @@ _HEAD = """\
 
 Every kind of incident, written by `python3 launch.py params --write` from
 `surveillance_runtime/alarms.py`; a test compares. How they are called, acknowledged and shelved is
-said in [long_runs.md](long_runs.md#incidents) and [watching.md](watching.md). In ISA-18.2's words:
-an incident of severity `alarm` calls a person until somebody acknowledges it, and returns to normal
-when it has been away for its off-delay: what comes and goes at a bound is one alarm and one all
-clear.
+said in [Long runs](../how-to/long_runs.md#incidents) and [Watch](../how-to/watch.md). In
+ISA-18.2's words: an incident of severity `alarm` calls a person until somebody acknowledges
+it, and returns to normal when it has been away for its off-delay: what comes and goes at a bound is
+one alarm and one all clear.
 
 | cause | severity | what | begins | is over | what to do |
 |---|---|---|---|---|---|""".splitlines()

@@ -1,4 +1,4 @@
-"""docs/architecture.md names what is there: every path, module and package in it exists."""
+"""The page on architecture names what is there: each path, module and package exists."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 CHECKOUT = Path(__file__).parents[2]
-TEXT = (CHECKOUT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
+TEXT = (CHECKOUT / 'docs' / 'explanation' / 'architecture.md').read_text(encoding='utf-8')
 FILES = subprocess.run(
     ['git', '-C', str(CHECKOUT), 'ls-files', '--cached', '--others', '--exclude-standard'],
     capture_output=True,

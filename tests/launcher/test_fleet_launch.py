@@ -148,7 +148,7 @@ def test_only_and_without_name_robots_and_their_nodes():
 
 
 def test_the_machines_of_the_document_start_each_node_once():
-    page = (CONFIG.parent / 'docs' / 'fleet.md').read_text()
+    page = (CONFIG.parent / 'docs' / 'how-to' / 'fleet.md').read_text()
     commands = re.findall(r'machine \d: +python3 launch.py (.*)', page)
     started = []
     for words in commands:

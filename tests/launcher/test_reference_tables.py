@@ -1,4 +1,4 @@
-"""The schema, docs/parameters.md and docs/interfaces.md say what the nodes declare and offer."""
+"""The schema and the pages of reference say what the nodes declare and offer."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_schema_and_interfaces_are_those_of_the_nodes(tmp_path):
     parameters, page = json.loads(path.read_text())
     hint = 'write them anew: python3 launch.py params --write'
     assert parameters == json.loads(SCHEMA.read_text()), hint
-    assert page == (ROOT / 'docs' / 'interfaces.md').read_text(), hint
+    assert page == (ROOT / 'docs' / 'reference' / 'interfaces.md').read_text(), hint
 
 
 def test_nodes_are_made_where_no_claimed_domain_hears_them(monkeypatch):
@@ -58,7 +58,8 @@ def test_nodes_are_made_where_no_claimed_domain_hears_them(monkeypatch):
 
 
 def test_the_page_of_parameters_is_written_from_the_schema():
-    assert (ROOT / 'docs' / 'parameters.md').read_text() == parameters_page(read_schema())
+    page = (ROOT / 'docs' / 'reference' / 'parameters.md').read_text()
+    assert page == parameters_page(read_schema())
 
 
 def test_params_prints_each_value_with_its_source():

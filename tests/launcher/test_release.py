@@ -21,7 +21,7 @@ ROSDEP = {
     'ruamel-yaml': 'python3-ruamel.yaml',
     'scikit-image': 'python3-skimage',
 }
-"""Keys of rosdep; what it lacks is named in docs/dependencies.md with the line for pip."""
+"""Keys of rosdep; the page on dependencies names what it lacks, with the line for pip."""
 
 
 def release():
@@ -64,7 +64,7 @@ def test_rosdep_and_the_wheel_need_the_same(name):
     keys = set(
         re.findall(r'<exec_depend>(.*?)</exec_depend>', (folder / 'package.xml').read_text())
     )
-    documented = (ROOT / 'docs' / 'dependencies.md').read_text()
+    documented = (ROOT / 'docs' / 'reference' / 'dependencies.md').read_text()
     for each in wanted - {library.replace('_', '-') for library in LIBRARIES}:
         if each in ROSDEP:
             assert ROSDEP[each] in keys

@@ -67,7 +67,7 @@ def carried_out(line: str, folder: Path, capfd: pytest.CaptureFixture[str]) -> s
     return done.stdout
 
 
-@pytest.mark.parametrize('page', ['tutorial.md', 'from_patrolling_sim.md'])
+@pytest.mark.parametrize('page', ['tutorial/first_patrol.md', 'how-to/from_patrolling_sim.md'])
 def test_the_page_does_what_it_says(
     page: str,
     tmp_path: Path,
@@ -95,7 +95,7 @@ def test_the_page_does_what_it_says(
                     assert mission.end(signal.SIGINT)[0] == 0
                 elif not line.startswith('.venv/bin/python'):
                     said += carried_out(line, tmp_path, capfd)
-    if page == 'tutorial.md':
+    if page == 'tutorial/first_patrol.md':
         assert (tmp_path / 'flat.png').exists()
         assert "beside a laboratory: ['Hall', 'Lab']" in said
     else:
@@ -119,7 +119,7 @@ def test_the_page_about_your_building_does_what_it_says(
     photo = cv2.warpPerspective(plan(24), turn, (2400, 3300), borderValue=(235, 240, 240))
     cv2.imwrite(str(tmp_path / 'photo.jpg'), photo)
     said, shown, driven = '', 0, 0
-    for language, text in blocks('your_building.md'):
+    for language, text in blocks('how-to/your_building.md'):
         if language == 'yaml':  # zones, which a person adds to the place
             with open('place.yaml', 'a', encoding='utf-8') as place:
                 place.write(text)

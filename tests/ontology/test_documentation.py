@@ -11,17 +11,17 @@ from armor_service.access import Settings
 from armor_service.client import Manipulation, Operation, Query, Utils
 
 DOCS = Path(__file__).parents[2] / 'docs'
-MANUAL = (DOCS / 'armor.md').read_text(encoding='utf-8')
+MANUAL = (DOCS / 'reference' / 'directives.md').read_text(encoding='utf-8')
 
 
 def test_the_directives_are_those_of_the_table() -> None:
-    path = DOCS / 'armor_directives.py'
+    path = DOCS / 'makers' / 'armor_directives.py'
     spec = importlib.util.spec_from_file_location('armor_directives', path)
     assert spec is not None
     assert spec.loader is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
-    assert script.updated(MANUAL) == MANUAL, 'run docs/armor_directives.py'
+    assert script.updated(MANUAL) == MANUAL, 'run docs/makers/armor_directives.py'
 
 
 def test_every_method_of_the_client_is_named() -> None:

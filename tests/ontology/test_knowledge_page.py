@@ -14,7 +14,7 @@ from armor_service.service import ArmorService
 from armor_service.store.store import Store
 from libs.armor_service.tests.seven_rooms import build_seven_rooms
 
-PAGE = Path(__file__).parents[2] / 'docs' / 'knowledge_in_python.md'
+PAGE = Path(__file__).parents[2] / 'docs' / 'how-to' / 'knowledge_in_python.md'
 
 
 def test_the_script_prints_the_urgent_rooms_and_adds_a_rule(tmp_path: Path) -> None:

@@ -155,4 +155,4 @@ def test_every_cause_in_the_code_is_in_the_table() -> None:
 
 def test_the_page_of_alarms_is_written_from_the_table() -> None:
     hint = 'write it anew: python3 launch.py params --write'
-    assert page() == (ROOT / 'docs' / 'alarms.md').read_text(), hint
+    assert page() == (ROOT / 'docs' / 'reference' / 'alarms.md').read_text(), hint

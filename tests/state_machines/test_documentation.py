@@ -29,11 +29,11 @@ def run_blocks(name, kind='tutorial'):
 
 
 def test_the_tutorial_runs():
-    assert run_blocks('fsm.md')[0] >= 10
+    assert run_blocks('explanation/state_machines.md')[0] >= 10
 
 
 def test_the_machine_that_came_from_yasmin_runs():
-    assert run_blocks('from_yasmin.md')[0] == 1
+    assert run_blocks('how-to/from_yasmin.md')[0] == 1
 
 
 class Plain(Node):
@@ -44,7 +44,7 @@ class Plain(Node):
 
 
 def test_the_machine_that_came_from_smach_runs_on_a_plain_node(graph):
-    count, code = run_blocks('from_smach.md', 'ros')
+    count, code = run_blocks('how-to/from_smach.md', 'ros')
     assert count == 1
     visited = []
 
@@ -59,9 +59,10 @@ def test_the_machine_that_came_from_smach_runs_on_a_plain_node(graph):
 
 
 def test_the_reference_is_current():
-    spec = importlib.util.spec_from_file_location('fsm_reference', DOCS / 'fsm_reference.py')
+    maker = DOCS / 'makers' / 'fsm_reference.py'
+    spec = importlib.util.spec_from_file_location('fsm_reference', maker)
     assert spec is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
-    current = (DOCS / 'fsm_reference.md').read_text(encoding='utf-8')
-    assert script.page() == current, 'run docs/fsm_reference.py'
+    current = (DOCS / 'reference' / 'state_machines.md').read_text(encoding='utf-8')
+    assert script.page() == current, 'run docs/makers/fsm_reference.py'

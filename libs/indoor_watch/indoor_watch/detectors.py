@@ -72,7 +72,7 @@ class Shipped:
         install: The command that installs it, without what it needs.
         file: Of the weights, within the module.
         licence: Of the weights.
-        sure, anybody, closer, scores: See `Detector`; measured in docs/measurements.md.
+        sure, anybody, closer, scores: See `Detector`; measured in docs/reference/measurements.md.
     """
 
     name: str

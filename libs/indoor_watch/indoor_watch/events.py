@@ -57,9 +57,10 @@ class Event:
         began, last: First and last sighting, seconds since 1970.
         sightings: How many observations.
         looks: In how many visits it was seen.
-        confidence: How likely it is so: of what is called 0.9, nine in ten are (docs/watching.md
-            has what was measured). Sightings from one spot in one visit err together: the surest
-            counts. Those of other visits, or from elsewhere, err each by itself.
+        confidence: How likely it is so: of what is called 0.9, nine in ten are
+            (measured: docs/reference/measurements.md). Sightings from one spot in one visit err
+            together: the surest counts. Those of other visits, or from elsewhere, err each by
+            itself.
         robots: Who saw it.
         evidence: Of the first sighting, the surest and the last one, as far as these differ.
         compared_with: What the last sighting was compared with; or empty.

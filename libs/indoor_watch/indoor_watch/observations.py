@@ -41,7 +41,7 @@ class Kind(StrEnum):
         said: States that are said otherwise than `door D1 is ajar`, with {thing}.
         joined: What makes two sightings of it one thing.
 
-    A test goes through all of them; docs/watching.md says what a new kind needs beside its entry.
+    A test goes through all of them; CONTRIBUTING.md says what a new kind needs beside its entry.
     """
 
     DOOR = (
