@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from armor_service.client import Manipulation, Operation, Query, Utils
 from armor_service.directives import TABLE, Kind
 from armor_service.protocol import ExitCode
 from armor_service.rendering import TYPES
@@ -18,6 +19,7 @@ from armor_service.rendering import TYPES
 BEGIN = '<!-- begin: written by docs/makers/armor_directives.py -->'
 END = '<!-- end -->'
 PAGE = Path(__file__).parents[1] / 'reference' / 'directives.md'
+_HEAD = ('directive', 'arguments', 'what it does', 'method of the Python client')
 _TITLES = {
     Kind.MANIPULATION: 'Manipulations',
     Kind.CONTROL: 'Applying and reasoning',
@@ -42,6 +44,7 @@ _CODES = {
 def directives_text() -> str:
     """Return the tables of directives, exit codes and value types, as Markdown."""
     parts = []
+    methods = _methods()
     for kind, title in _TITLES.items():
         rows = [
             (
@@ -49,16 +52,28 @@ def directives_text() -> str:
                 directive.signature or '–',
                 directive.summary
                 + (f' *Differs from ARMOR 2.2: {directive.differs}*' if directive.differs else ''),
+                ', '.join(f'`{method}`' for method in methods.get(directive.words, ())) or '–',
             )
             for directive in TABLE.values()
             if directive.kind is kind
         ]
-        parts.append(f'### {title}\n\n' + _table(('directive', 'arguments', 'what it does'), rows))
+        parts.append(f'### {title}\n\n' + _table(_HEAD, rows))
     codes = [(str(int(code)), meaning) for code, meaning in _CODES.items()]
     parts.append('### Exit codes\n\n' + _table(('code', 'when'), codes))
     types = [(f'`{word}`', f'`xsd:{datatype}`') for word, datatype in TYPES.items()]
     parts.append('### Value types\n\n' + _table(('type', 'stored as'), types))
     return '\n\n'.join(parts)
+
+
+def _methods() -> dict[str, list[str]]:
+    """Return the methods of the Python client that send each directive."""
+    found: dict[str, list[str]] = {}
+    for part in (Manipulation, Query, Utils):
+        for name, method in vars(part).items():
+            if isinstance(method, Operation):
+                for words in method.words:
+                    found.setdefault(words, []).append(f'{part.__name__.lower()}.{name}')
+    return found
 
 
 def updated(manual: str) -> str:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
-import inspect
 import re
 from pathlib import Path
 
 from armor_service.access import Settings
-from armor_service.client import Manipulation, Operation, Query, Utils
 
 DOCS = Path(__file__).parents[2] / 'docs'
 MANUAL = (DOCS / 'reference' / 'directives.md').read_text(encoding='utf-8')
@@ -22,13 +20,6 @@ def test_the_directives_are_those_of_the_table() -> None:
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     assert script.updated(MANUAL) == MANUAL, 'run docs/makers/armor_directives.py'
-
-
-def test_every_method_of_the_client_is_named() -> None:
-    for part in (Manipulation, Query, Utils):
-        for name, member in inspect.getmembers_static(part):
-            if isinstance(member, Operation):
-                assert f'`{name}`' in MANUAL
 
 
 def test_bounds_are_those_of_the_settings() -> None:

@@ -10,9 +10,13 @@ Each method can be called in two ways: blocking, or with ``await``:
     client.query.ind_b2_class('ROOM')                    # blocks; from a thread
     await client.query.ind_b2_class.call_async('ROOM')   # in a callback of a node
 
-A method decorated with `operation` makes a generator: it yields the directives it wants carried out
-and receives their responses, and what it returns is the result. How the directives travel is the
-business of the client's `Transport`. The client for ROS is
+Most methods are one directive of the service's table: a line says which one, what it takes and what
+is read of the answer. ``help(client.query.rules)`` says what the table does, which is imported for
+that alone: a client needs no reasoner. A method decorated with `operation` makes a generator: it
+yields the directives it wants carried out and receives their responses, and what it returns is the
+result.
+
+How directives travel is the business of the client's `Transport`. The client for ROS is
 `surveillance_ontology.armor_client.ArmorClient`; this module knows no ROS.
 """
 
@@ -21,7 +25,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import suppress
-from functools import update_wrapper
+from inspect import Signature, signature
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -30,6 +34,7 @@ from typing import (
     ParamSpec,
     Protocol,
     TypeVar,
+    cast,
     overload,
 )
 
@@ -112,12 +117,28 @@ class HasTransport(Protocol):
 
 
 class BoundOperation(Generic[P, R]):
-    """An operation of one client."""
+    """An operation of one client.
 
-    def __init__(self, owner: HasTransport, steps: Callable[..., Steps[R]]) -> None:
+    Attributes:
+        operation: What it is for any client.
+    """
+
+    def __init__(self, owner: HasTransport, operation: Operation[Any, P, R]) -> None:
         self._owner = owner
-        self._steps = steps
-        update_wrapper(self, steps)
+        self._steps = operation.steps
+        self.operation = operation
+
+    @property
+    def __doc__(self) -> str:  # type: ignore[override]
+        """What the operation does."""
+        return self.operation.help
+
+    @property
+    def __signature__(self) -> Signature:
+        """What it takes."""
+        taken = signature(self.operation.takes)
+        arguments = [one for one in taken.parameters.values() if one.name != 'self']
+        return taken.replace(parameters=arguments, return_annotation=Signature.empty)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Block until the result; never in a callback of the node that spins."""
@@ -147,11 +168,37 @@ class BoundOperation(Generic[P, R]):
 
 
 class Operation(Generic[S, P, R]):
-    """The descriptor behind `operation`."""
+    """The descriptor behind `operation` and `directive`.
 
-    def __init__(self, steps: Callable[Concatenate[S, P], Steps[R]]) -> None:
-        self._steps = steps
-        self.__doc__ = steps.__doc__
+    Args:
+        steps: What it does for its owner.
+        words: The directives that it may send.
+        takes: A function with the arguments of the method.
+        help: What it does, in a sentence; without, what the table says of its first directive.
+
+    Attributes:
+        steps, words, takes: As above.
+    """
+
+    def __init__(
+        self,
+        steps: Callable[Concatenate[S, P], Steps[R]],
+        words: Sequence[str],
+        takes: Callable[..., object],
+        help: str | None = None,
+    ) -> None:
+        self.steps, self.words, self.takes = steps, words, takes
+        self._help = help
+
+    @property
+    def help(self) -> str:
+        """What it does."""
+        if self._help is not None:
+            return self._help
+        # The table needs the reasoner, which a client does not.
+        from armor_service.directives import TABLE
+
+        return next(row.summary for row in TABLE.values() if row.words == self.words[0])
 
     @overload
     def __get__(self, owner: None, kind: type[S]) -> Operation[S, P, R]: ...
@@ -160,14 +207,120 @@ class Operation(Generic[S, P, R]):
     def __get__(
         self, owner: S | None, kind: type[S] | None = None
     ) -> Operation[S, P, R] | BoundOperation[P, R]:
-        if owner is None:
-            return self
-        return BoundOperation(owner, self._steps)
+        return self if owner is None else BoundOperation(owner, self)
 
 
-def operation(steps: Callable[Concatenate[S, P], Steps[R]]) -> Operation[S, P, R]:
-    """Make a generator method callable in both ways."""
-    return Operation(steps)
+def operation(
+    *words: str,
+) -> Callable[[Callable[Concatenate[S, P], Steps[R]]], Operation[S, P, R]]:
+    """Make a generator method, which sends directives of these words, callable in both ways."""
+    return lambda steps: Operation(steps, words, steps, steps.__doc__)
+
+
+def directive(
+    words: str, takes: Callable[P, None], read: Callable[[DirectiveResponse], R], *last: str
+) -> Operation[ClientPart, P, R]:
+    """Return a method that sends one directive with its arguments in order, as text.
+
+    A list stands for several arguments. ``with_URI`` is not sent: without it, entities in the
+    result are read as names.
+
+    Args:
+        words: Command and specifications; behind ``|`` those for when the last argument, which is
+            optional then, is given.
+        takes: A function with the arguments of the method.
+        read: Makes the result of the response, which is a success.
+        last: Further arguments, always the same.
+    """
+    short, *long = words.split('|')
+    parameters = signature(takes)
+    has_names = 'with_URI' in parameters.parameters
+
+    def steps(owner: ClientPart, /, *args: P.args, **kwargs: P.kwargs) -> Steps[R]:
+        bound = parameters.bind(*args, **kwargs)
+        bound.apply_defaults()
+        values: list[Any] = list(bound.args)
+        shortened = has_names and not values.pop()
+        if long and not values[-1]:
+            values.pop()
+        sent: list[str] = []
+        for value in values:
+            sent += [str(value)] if isinstance(value, str | float | int) else value
+        chosen = long[0] if long and len(values) > 1 else short
+        result: Any = read((yield from owner.carry_out(chosen, *sent, *last)))
+        named: Any = [name_in(text) for text in result] if shortened else result
+        return cast('R', named)
+
+    return Operation(steps, (short, *long), takes)
+
+
+def _texts(response: DirectiveResponse) -> list[str]:
+    return response.queried_objects
+
+
+def _entities(response: DirectiveResponse) -> list[str]:
+    # Without owl:Nothing.
+    return [rendered for rendered in response.queried_objects if rendered.startswith('<')]
+
+
+def _first(response: DirectiveResponse) -> str | None:
+    return next(iter(response.queried_objects), None)
+
+
+def _rows(response: DirectiveResponse) -> list[dict[str, str]]:
+    return [json.loads(row) for row in response.queried_objects]
+
+
+def _facts(response: DirectiveResponse) -> list[ShortFact]:
+    return [parse_fact(text) for text in response.queried_objects]
+
+
+def _explanation(response: DirectiveResponse) -> tuple[str, str] | None:
+    found = response.queried_objects
+    return (found[0], found[1]) if found else None
+
+
+def _done(_: DirectiveResponse) -> None:
+    return
+
+
+def _consistent(response: DirectiveResponse) -> bool:
+    return response.is_consistent
+
+
+# What the methods take, by the names of ARMOR's own Python API.
+def _nothing() -> None: ...
+def _ind(ind_name: str) -> None: ...
+def _inds(ind_names: Iterable[str]) -> None: ...
+def _ind_of_class(ind_name: str, class_name: str) -> None: ...
+def _class(class_name: str) -> None: ...
+def _classes(class_names: Iterable[str]) -> None: ...
+def _class_below(class_name: str, super_class_name: str = '') -> None: ...
+def _members(class_name: str, ind_name: str = '') -> None: ...
+def _cardinality(
+    class_name: str, objectprop_name: str, cardinality: int, value_class_name: str
+) -> None: ...
+def _related(objectprop_name: str, ind_name: str = '') -> None: ...
+def _relation(objectprop_name: str, ind_name: str, value_obj_name: str) -> None: ...
+def _relation_instead(
+    objectprop_name: str, ind_name: str, new_value: str, old_value: str
+) -> None: ...
+def _values(dataprop_name: str, ind_name: str) -> None: ...
+def _value(dataprop_name: str, ind_name: str, value_type: str, value: str) -> None: ...
+def _value_instead(
+    dataprop_name: str, ind_name: str, value_type: str, new_value: str, old_value: str
+) -> None: ...
+def _renaming(old_name: str, new_name: str) -> None: ...
+def _name(name: str) -> None: ...
+def _axiom(axiom: str) -> None: ...
+def _rule(rule: str) -> None: ...
+def _query(query: str, timeout_ms: int = 0) -> None: ...
+def _seconds(seconds: float) -> None: ...
+def _file(filepath: str) -> None: ...
+def _ind_uri(ind_name: str, with_URI: bool = False) -> None: ...  # noqa: N803
+def _class_uri(class_name: str, with_URI: bool = False) -> None: ...  # noqa: N803
+def _expression_uri(expression: str, with_URI: bool = False) -> None: ...  # noqa: N803
+def _related_uri(objectprop_name: str, ind_name: str, with_URI: bool = False) -> None: ...  # noqa: N803
 
 
 class ClientPart:
@@ -185,7 +338,8 @@ class ClientPart:
         """Make a directive of the client."""
         return self.client.request(words, *args)
 
-    def _carry_out(self, words: str, *args: str) -> Steps[DirectiveResponse]:
+    def carry_out(self, words: str, *args: str) -> Steps[DirectiveResponse]:
+        """Send a directive and return its response, which is a success."""
         return checked((yield self.request(words, *args)))
 
 
@@ -207,105 +361,31 @@ class Manipulation(ClientPart):
     raise `ArmorServiceCallError` and `ArmorServiceInternalError`. Values are given as text.
     """
 
-    def _change(self, words: str, *args: str) -> Steps[bool]:
-        return (yield from self._carry_out(words, *args)).is_consistent
+    add_ind = directive('ADD IND', _ind, _consistent)
+    add_ind_to_class = directive('ADD IND CLASS', _ind_of_class, _consistent)
+    add_class = directive('ADD CLASS|ADD CLASS CLASS', _class_below, _consistent)
+    disj_inds = directive('DISJOINT IND', _inds, _consistent)
+    disj_inds_of_class = directive('DISJOINT IND CLASS', _class, _consistent)
+    disj_classes = directive('DISJOINT CLASS', _classes, _consistent)
+    disj_subclasses = directive('DISJOINT CLASS CLASS', _class, _consistent)
+    make_equivalent = directive('MAKE EQUIVALENT CLASS', _class, _consistent)
+    add_min_cardinality = directive('ADD CARDINALITY MIN', _cardinality, _consistent)
+    add_objectprop_to_ind = directive('ADD OBJECTPROP IND', _relation, _consistent)
+    add_dataprop_to_ind = directive('ADD DATAPROP IND', _value, _consistent)
 
-    def _change_all(self, requests: Sequence[DirectiveRequest]) -> Steps[bool]:
-        if not requests:
-            return True
-        answer: ListResponse = yield requests
-        for response in answer.responses:
-            checked(response)
-        return answer.is_consistent
-
-    @operation
-    def add_ind(self, ind_name: str) -> Steps[bool]:
-        """Make an individual known."""
-        return self._change('ADD IND', ind_name)
-
-    @operation
-    def add_ind_to_class(self, ind_name: str, class_name: str) -> Steps[bool]:
-        """Assert that an individual is of a class."""
-        return self._change('ADD IND CLASS', ind_name, class_name)
-
-    @operation
-    def add_class(self, class_name: str, super_class_name: str = '') -> Steps[bool]:
-        """Make a class known, below another if one is given."""
-        if super_class_name:
-            return self._change('ADD CLASS CLASS', class_name, super_class_name)
-        return self._change('ADD CLASS', class_name)
-
-    @operation
-    def disj_inds(self, ind_names: Iterable[str]) -> Steps[bool]:
-        """State that individuals are different."""
-        return self._change('DISJOINT IND', *ind_names)
-
-    @operation
-    def disj_inds_of_class(self, class_name: str) -> Steps[bool]:
-        """State that the instances of a class, as of the last reasoning, are different."""
-        return self._change('DISJOINT IND CLASS', class_name)
-
-    @operation
-    def disj_classes(self, class_names: Iterable[str]) -> Steps[bool]:
-        """State that no two classes share an instance."""
-        return self._change('DISJOINT CLASS', *class_names)
-
-    @operation
-    def disj_subclasses(self, class_name: str) -> Steps[bool]:
-        """State that no two subclasses of a class share an instance."""
-        return self._change('DISJOINT CLASS CLASS', class_name)
-
-    @operation
-    def make_equivalent(self, class_name: str) -> Steps[bool]:
-        """Turn what a class is a subclass of into its definition."""
-        return self._change('MAKE EQUIVALENT CLASS', class_name)
-
-    @operation
-    def add_min_cardinality(
-        self, class_name: str, objectprop_name: str, cardinality: int, value_class_name: str
-    ) -> Steps[bool]:
-        """State that instances of a class have so many values of a property at least."""
-        args = (class_name, objectprop_name, str(cardinality), value_class_name)
-        return self._change('ADD CARDINALITY MIN', *args)
-
-    @operation
-    def add_objectprop_to_ind(
-        self, objectprop_name: str, ind_name: str, value_obj_name: str
-    ) -> Steps[bool]:
-        """Relate an individual to another."""
-        return self._change('ADD OBJECTPROP IND', objectprop_name, ind_name, value_obj_name)
-
-    @operation
-    def add_dataprop_to_ind(
-        self, dataprop_name: str, ind_name: str, value_type: str, value: str
-    ) -> Steps[bool]:
-        """Add a value to a data property of an individual; ``value_type`` as LONG, STRING, ..."""
-        return self._change('ADD DATAPROP IND', dataprop_name, ind_name, value_type, value)
-
-    @operation
+    @operation('ADD DATAPROP IND')
     def add_batch_dataprop_to_ind(
         self, ind_name: str, properties: Iterable[Sequence[str]]
     ) -> Steps[bool]:
         """Add values, each ``[property, type, value]``, in one batch."""
-        return self._change_all(self._dataprops('ADD', ind_name, properties))
+        return self._change_all('ADD', ind_name, properties)
 
-    @operation
-    def replace_objectprop_b2_ind(
-        self, objectprop_name: str, ind_name: str, new_value: str, old_value: str
-    ) -> Steps[bool]:
-        """Relate an individual to a new one instead of an old one."""
-        args = (objectprop_name, ind_name, new_value, old_value)
-        return self._change('REPLACE OBJECTPROP IND', *args)
+    set_objectprop_of_ind = directive('SET OBJECTPROP IND', _relation, _consistent)
+    set_dataprop_of_ind = directive('SET DATAPROP IND', _value, _consistent)
+    replace_objectprop_b2_ind = directive('REPLACE OBJECTPROP IND', _relation_instead, _consistent)
+    replace_dataprop_b2_ind = directive('REPLACE DATAPROP IND', _value_instead, _consistent)
 
-    @operation
-    def replace_dataprop_b2_ind(
-        self, dataprop_name: str, ind_name: str, value_type: str, new_value: str, old_value: str
-    ) -> Steps[bool]:
-        """Put a new value in the place of an old one; both bare or as queries return them."""
-        args = (dataprop_name, ind_name, value_type, new_value, old_value)
-        return self._change('REPLACE DATAPROP IND', *args)
-
-    @operation
+    @operation('QUERY DATAPROP IND', 'REPLACE DATAPROP IND', 'ADD DATAPROP IND')
     def replace_one_dataprop_b2_ind(
         self, dataprop_name: str, ind_name: str, value_type: str, new_value: str
     ) -> Steps[bool]:
@@ -316,7 +396,7 @@ class Manipulation(ClientPart):
         """
         return self._replace_one('DATAPROP IND', dataprop_name, ind_name, value_type, new_value)
 
-    @operation
+    @operation('QUERY OBJECTPROP IND', 'REPLACE OBJECTPROP IND', 'ADD OBJECTPROP IND')
     def replace_one_objectprop_b2_ind(
         self, objectprop_name: str, ind_name: str, new_value: str
     ) -> Steps[bool]:
@@ -327,148 +407,65 @@ class Manipulation(ClientPart):
         """
         return self._replace_one('OBJECTPROP IND', objectprop_name, ind_name, new_value)
 
+    remove_ind = directive('REMOVE IND', _ind, _consistent)
+    remove_ind_from_class = directive('REMOVE IND CLASS', _ind_of_class, _consistent)
+    remove_class = directive('REMOVE CLASS|REMOVE CLASS CLASS', _class_below, _consistent)
+    remove_dataprop_from_ind = directive('REMOVE DATAPROP IND', _value, _consistent)
+
+    @operation('REMOVE DATAPROP IND')
+    def remove_batch_dataprop_to_ind(
+        self, ind_name: str, properties: Iterable[Sequence[str]]
+    ) -> Steps[bool]:
+        """Retract values, each ``[property, type, value]``, in one batch."""
+        return self._change_all('REMOVE', ind_name, properties)
+
+    remove_objectprop_from_ind = directive('REMOVE OBJECTPROP IND', _relation, _consistent)
+    rename_ind = directive('RENAME IND', _renaming, _consistent)
+    rename_class = directive('RENAME CLASS', _renaming, _consistent)
+    rename_dataprop = directive('RENAME DATAPROP', _renaming, _consistent)
+    rename_objectprop = directive('RENAME OBJECTPROP', _renaming, _consistent)
+    add_axiom = directive('ADD AXIOM', _axiom, _consistent)
+    remove_axiom = directive('REMOVE AXIOM', _axiom, _consistent)
+    add_rule = directive('ADD RULE', _rule, _consistent)
+    remove_rule = directive('REMOVE RULE', _rule, _consistent)
+    close_objectprop = directive('CLOSE OBJECTPROP|CLOSE OBJECTPROP IND', _related, _consistent)
+    close_class = directive('CLOSE CLASS|CLOSE CLASS IND', _members, _consistent)
+
+    def _change_all(
+        self, command: str, ind_name: str, properties: Iterable[Sequence[str]]
+    ) -> Steps[bool]:
+        words = f'{command} DATAPROP IND'
+        requests = [self.request(words, prop, ind_name, *value) for prop, *value in properties]
+        if not requests:
+            return True
+        answer: ListResponse = yield requests
+        for response in answer.responses:
+            checked(response)
+        return answer.is_consistent
+
     def _replace_one(self, words: str, prop: str, ind: str, *new: str) -> Steps[bool]:
-        old = (yield from self._carry_out(f'QUERY {words}', prop, ind)).queried_objects
+        old = (yield from self.carry_out(f'QUERY {words}', prop, ind)).queried_objects
         if len(old) > 1:
             raise ArmorServiceInternalError(
                 f'{prop} of {ind} has {len(old)} values, expected one: {", ".join(old)}',
                 ExitCode.SEVERAL_VALUES,
             )
         command = 'REPLACE' if old else 'ADD'
-        return (yield from self._change(f'{command} {words}', prop, ind, *new, *old))
-
-    @operation
-    def remove_ind(self, ind_name: str) -> Steps[bool]:
-        """Remove an individual with all that is asserted of it."""
-        return self._change('REMOVE IND', ind_name)
-
-    @operation
-    def remove_ind_from_class(self, ind_name: str, class_name: str) -> Steps[bool]:
-        """Retract that an individual is of a class."""
-        return self._change('REMOVE IND CLASS', ind_name, class_name)
-
-    @operation
-    def remove_class(self, class_name: str, super_class_name: str = '') -> Steps[bool]:
-        """Remove a class, or only that it is below another."""
-        if super_class_name:
-            return self._change('REMOVE CLASS CLASS', class_name, super_class_name)
-        return self._change('REMOVE CLASS', class_name)
-
-    @operation
-    def remove_dataprop_from_ind(
-        self, dataprop_name: str, ind_name: str, value_type: str, value: str
-    ) -> Steps[bool]:
-        """Retract a value of a data property."""
-        return self._change('REMOVE DATAPROP IND', dataprop_name, ind_name, value_type, value)
-
-    @operation
-    def remove_batch_dataprop_to_ind(
-        self, ind_name: str, properties: Iterable[Sequence[str]]
-    ) -> Steps[bool]:
-        """Retract values, each ``[property, type, value]``, in one batch."""
-        return self._change_all(self._dataprops('REMOVE', ind_name, properties))
-
-    @operation
-    def remove_objectprop_from_ind(
-        self, objectprop_name: str, ind_name: str, value_obj_name: str
-    ) -> Steps[bool]:
-        """Retract a relation."""
-        return self._change('REMOVE OBJECTPROP IND', objectprop_name, ind_name, value_obj_name)
-
-    @operation
-    def rename_ind(self, old_name: str, new_name: str) -> Steps[bool]:
-        """Give an individual another name."""
-        return self._change('RENAME IND', old_name, new_name)
-
-    @operation
-    def rename_class(self, old_name: str, new_name: str) -> Steps[bool]:
-        """Give a class another name."""
-        return self._change('RENAME CLASS', old_name, new_name)
-
-    @operation
-    def rename_dataprop(self, old_name: str, new_name: str) -> Steps[bool]:
-        """Give a data property another name."""
-        return self._change('RENAME DATAPROP', old_name, new_name)
-
-    @operation
-    def rename_objectprop(self, old_name: str, new_name: str) -> Steps[bool]:
-        """Give an object property another name."""
-        return self._change('RENAME OBJECTPROP', old_name, new_name)
-
-    @operation
-    def add_axiom(self, axiom: str) -> Steps[bool]:
-        """Assert frames in Manchester syntax, ``Class: A SubClassOf: B``."""
-        return self._change('ADD AXIOM', axiom)
-
-    @operation
-    def remove_axiom(self, axiom: str) -> Steps[bool]:
-        """Retract frames in Manchester syntax."""
-        return self._change('REMOVE AXIOM', axiom)
-
-    @operation
-    def add_rule(self, rule: str) -> Steps[bool]:
-        """Assert a rule, ``ROOM(?r), hasDoor(?r, ?d) -> Open(?r)``."""
-        return self._change('ADD RULE', rule)
-
-    @operation
-    def remove_rule(self, rule: str) -> Steps[bool]:
-        """Retract a rule."""
-        return self._change('REMOVE RULE', rule)
-
-    @operation
-    def close_objectprop(self, objectprop_name: str, ind_name: str = '') -> Steps[bool]:
-        """State that an individual, or each, is related to nothing but what is known."""
-        if ind_name:
-            return self._change('CLOSE OBJECTPROP IND', objectprop_name, ind_name)
-        return self._change('CLOSE OBJECTPROP', objectprop_name)
-
-    @operation
-    def close_class(self, class_name: str, ind_name: str = '') -> Steps[bool]:
-        """State that an individual, or each that is not known to be of a class, is not."""
-        if ind_name:
-            return self._change('CLOSE CLASS IND', class_name, ind_name)
-        return self._change('CLOSE CLASS', class_name)
-
-    def _dataprops(
-        self, command: str, ind_name: str, properties: Iterable[Sequence[str]]
-    ) -> list[DirectiveRequest]:
-        return [
-            self.request(f'{command} DATAPROP IND', prop, ind_name, value_type, value)
-            for prop, value_type, value in properties
-        ]
+        response = yield from self.carry_out(f'{command} {words}', prop, ind, *new, *old)
+        return response.is_consistent
 
 
 class Query(ClientPart):
-    """Directives that ask. All raise `ArmorServiceCallError` and `ArmorServiceInternalError`."""
+    """Directives that ask. All raise `ArmorServiceCallError` and `ArmorServiceInternalError`.
 
-    def _objects(self, words: str, *args: str) -> Steps[list[str]]:
-        return (yield from self._carry_out(words, *args)).queried_objects
+    ``with_URI`` asks for ``<iri#name>``, where without it the name alone is given.
+    """
 
-    def _names(self, with_uri: bool, words: str, *args: str) -> Steps[list[str]]:
-        objects = yield from self._objects(words, *args)
-        return objects if with_uri else [name_in(rendered) for rendered in objects]
+    ind_b2_class = directive('QUERY IND CLASS', _class_uri, _texts)
+    objectprop_b2_ind = directive('QUERY OBJECTPROP IND', _related_uri, _texts)
+    dataprop_b2_ind = directive('QUERY DATAPROP IND', _values, _texts)
 
-    @operation
-    def ind_b2_class(self, class_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Yield individuals of a class: names, or ``<iri#name>`` when asked for."""
-        return self._names(with_URI, 'QUERY IND CLASS', class_name)
-
-    @operation
-    def objectprop_b2_ind(
-        self,
-        objectprop_name: str,
-        ind_name: str,
-        with_URI: bool = False,  # noqa: N803
-    ) -> Steps[list[str]]:
-        """Yield individuals that an individual is related to: names, or ``<iri#name>``."""
-        return self._names(with_URI, 'QUERY OBJECTPROP IND', objectprop_name, ind_name)
-
-    @operation
-    def dataprop_b2_ind(self, dataprop_name: str, ind_name: str) -> Steps[list[str]]:
-        """Yield values of a data property, as ``"1665579740"^^xsd:long``; see `value_in`."""
-        return self._objects('QUERY DATAPROP IND', dataprop_name, ind_name)
-
-    @operation
+    @operation('QUERY IND')
     def check_ind_exists(self, ind_name: str) -> Steps[bool]:
         """Tell whether an individual is of any class."""
         response: DirectiveResponse = yield self.request('QUERY IND', ind_name)
@@ -476,156 +473,77 @@ class Query(ClientPart):
             checked(response)
         return response.success and bool(response.queried_objects)
 
-    @operation
-    def class_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Yield all classes of an individual: names, or ``<iri#name>``."""
-        return self._names(with_URI, 'QUERY CLASS IND', ind_name, 'false')
+    class_of_ind = directive('QUERY CLASS IND', _ind_uri, _texts, 'false')
+    bottom_class_of_ind = directive('QUERY CLASS IND', _ind, _first, 'true')
+    subclasses = directive(
+        'QUERY CLASS CLASS',
+        _class_uri,
+        _entities,
+    )
+    restrictions = directive('QUERY CLASS RESTRICTIONS', _class, _texts)
+    dataprops_of_ind = directive('QUERY IND DATAPROP', _ind_uri, _texts)
+    objectprops_of_ind = directive('QUERY IND OBJECTPROP', _ind_uri, _texts)
+    sparql = directive('QUERY SPARQL ROWS', _query, _rows)
 
-    @operation
-    def bottom_class_of_ind(self, ind_name: str) -> Steps[str | None]:
-        """Name of a class of an individual that has no subclass; None when there is none."""
-        names = yield from self._objects('QUERY CLASS IND', ind_name, 'true')
-        return names[0] if names else None
-
-    @operation
-    def subclasses(self, class_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Classes below a class: names, or ``<iri#name>``; without owl:Nothing."""
-        objects = yield from self._objects('QUERY CLASS CLASS', class_name)
-        below = [rendered for rendered in objects if rendered.startswith('<')]
-        return below if with_URI else [name_in(rendered) for rendered in below]
-
-    @operation
-    def restrictions(self, class_name: str) -> Steps[list[str]]:
-        """Definitions of a class as text."""
-        return self._objects('QUERY CLASS RESTRICTIONS', class_name)
-
-    @operation
-    def dataprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Yield data properties that have a value for an individual."""
-        return self._names(with_URI, 'QUERY IND DATAPROP', ind_name)
-
-    @operation
-    def objectprops_of_ind(self, ind_name: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Yield object properties that have a value for an individual."""
-        return self._names(with_URI, 'QUERY IND OBJECTPROP', ind_name)
-
-    @operation
-    def sparql(self, query: str, timeout_ms: int = 0) -> Steps[list[dict[str, str]]]:
-        """Run a SPARQL SELECT over asserted and derived facts.
-
-        Args:
-            query: The query with its prefixes.
-            timeout_ms: Longest time in milliseconds; 0 leaves it to the server.
-
-        Returns:
-            One dictionary of variable and value for each row, without the unbound variables.
-        """
-        objects = yield from self._objects('QUERY SPARQL ROWS', query, str(timeout_ms))
-        return [json.loads(row) for row in objects]
-
-    @operation
+    @operation('QUERY FACT')
     def facts(self, pattern: str) -> Steps[list[ShortFact]]:
-        """Yield asserted and derived facts that match a pattern such as ``canReach(Robot1, ?)``."""
+        """Return asserted and derived facts that match a pattern, ``canReach(Robot1, ?)``."""
         parse_fact(pattern)
-        objects = yield from self._objects('QUERY FACT', pattern)
-        return [parse_fact(text) for text in objects]
+        return _facts((yield from self.carry_out('QUERY FACT', pattern)))
 
-    @operation
+    @operation('QUERY FACT')
     def facts_by_origin(self, pattern: str) -> Steps[tuple[list[ShortFact], list[ShortFact]]]:
-        """Yield facts that match a pattern: all of them, and those of them that are asserted."""
+        """Return facts that match a pattern: all of them, and those of them that are asserted."""
         parse_fact(pattern)
-        rows = [
+        answer: ListResponse = yield [
             self.request('QUERY FACT', pattern),
             self.request('QUERY FACT', pattern, 'true'),
         ]
-        answer: ListResponse = yield rows
-        every, asserted = (
-            [parse_fact(text) for text in checked(response).queried_objects]
-            for response in answer.responses
-        )
-        return every, asserted
+        every, asserted = answer.responses
+        return _facts(checked(every)), _facts(checked(asserted))
 
-    @operation
+    @operation('QUERY EXPLAIN')
     def explain(self, fact: str) -> Steps[tuple[str, str] | None]:
-        """Yield why a fact such as ``URGENT(R3)`` holds: a sentence and a tree; None when it does
-        not.
-        """
+        """Return why a fact such as ``URGENT(R3)`` holds, a sentence and a tree, or None."""
         parse_fact(fact)
         response: DirectiveResponse = yield self.request('QUERY EXPLAIN', fact)
         if not response.success and response.exit_code == ExitCode.OK:
             return None
-        sentence, tree = checked(response).queried_objects
-        return sentence, tree
+        return _explanation(checked(response))
 
-    @operation
+    @operation('QUERY EXPLAIN ABSENCE')
     def explain_absence(self, fact: str) -> Steps[list[str]]:
-        """Yield what a fact such as ``URGENT(R3)`` lacks: a sentence, then each missing condition;
+        """Return what a fact such as ``URGENT(R3)`` lacks: a sentence, then each missing condition;
         nothing where it holds.
         """
         parse_fact(fact)
-        return self._objects('QUERY EXPLAIN ABSENCE', fact)
+        return _texts((yield from self.carry_out('QUERY EXPLAIN ABSENCE', fact)))
 
-    @operation
-    def ind_b2_expression(self, expression: str, with_URI: bool = False) -> Steps[list[str]]:  # noqa: N803
-        """Yield individuals of a class expression in Manchester syntax."""
-        return self._names(with_URI, 'QUERY IND EXPRESSION', expression)
-
-    @operation
-    def axioms(self, name: str) -> Steps[list[str]]:
-        """Yield what is asserted of an entity, in Manchester syntax."""
-        return self._objects('QUERY AXIOMS', name)
-
-    @operation
-    def rules(self) -> Steps[list[str]]:
-        """Yield the rules, in Manchester syntax."""
-        return self._objects('QUERY RULES')
-
-    @operation
-    def taken_back(self) -> Steps[list[str]]:
-        """Yield the changes that were taken back for want of time: what, whose, when and why."""
-        return self._objects('QUERY TAKEN BACK')
-
-    @operation
-    def explain_inconsistency(self) -> Steps[tuple[str, str] | None]:
-        """Yield why the ontology contradicts itself; None when it does not."""
-        objects = yield from self._objects('QUERY EXPLAIN INCONSISTENCY')
-        return (objects[0], objects[1]) if objects else None
+    ind_b2_expression = directive('QUERY IND EXPRESSION', _expression_uri, _texts)
+    axioms = directive('QUERY AXIOMS', _name, _texts)
+    rules = directive('QUERY RULES', _nothing, _texts)
+    unsupported = directive('QUERY UNSUPPORTED', _nothing, _texts)
+    taken_back = directive('QUERY TAKEN BACK', _nothing, _texts)
+    explain_inconsistency = directive('QUERY EXPLAIN INCONSISTENCY', _nothing, _explanation)
 
 
 class Utils(ClientPart):
     """Directives about references, files and logging."""
 
-    @operation
-    def apply_buffered_changes(self) -> Steps[bool]:
-        """Apply buffered manipulations; whether the ontology was consistent at the last REASON."""
-        return (yield from self._carry_out('APPLY')).is_consistent
+    apply_buffered_changes = directive('APPLY', _nothing, _consistent)
+    sync_buffered_reasoner = directive('REASON', _nothing, _consistent)
+    reason_within = directive('REASON', _seconds, _consistent)
+    cancel = directive('CANCEL', _nothing, _done)
+    save_ref_with_inferences = directive('SAVE INFERENCE', _file, _done)
 
-    @operation
-    def sync_buffered_reasoner(self) -> Steps[bool]:
-        """Apply buffered manipulations and reason; whether the ontology is consistent."""
-        return (yield from self._carry_out('REASON')).is_consistent
-
-    @operation
-    def reason_within(self, seconds: float) -> Steps[bool]:
-        """Reason as `sync_buffered_reasoner` does, for so many seconds of processor time."""
-        return (yield from self._carry_out('REASON', repr(float(seconds)))).is_consistent
-
-    @operation
-    def cancel(self) -> Steps[None]:
-        """End the reasoning that runs."""
-        yield from self._carry_out('CANCEL')
-
-    @operation
-    def save_ref_with_inferences(self, filepath: str) -> Steps[None]:
-        """Save with the derived facts."""
-        yield from self._carry_out('SAVE INFERENCE', filepath)
-
-    @operation
+    @operation('SAVE', 'SAVE INFERENCE')
     def save(self, filepath: str, inference: bool = False) -> Steps[None]:
         """Save, with the derived facts if asked for; an empty path is the file that was loaded."""
-        yield from self._carry_out('SAVE INFERENCE' if inference else 'SAVE', filepath)
+        yield from self.carry_out('SAVE INFERENCE' if inference else 'SAVE', filepath)
 
-    @operation
+    backup = directive('BACKUP', _file, _done)
+
+    @operation('LOAD FILE', 'LOAD FILE MOUNTED')
     def load_ref_from_file(
         self,
         owl_file_path: str,
@@ -638,51 +556,33 @@ class Utils(ClientPart):
         """Load an ontology; nothing happens when the reference is loaded already."""
         flags = (str(buffered_manipulation), reasoner, str(buffered_reasoner))
         words = 'LOAD FILE MOUNTED' if mounted else 'LOAD FILE'
-        yield from self._carry_out(words, owl_file_path, iri, *flags)
+        yield from self.carry_out(words, owl_file_path, iri, *flags)
 
-    @operation
-    def drop_ref(self) -> Steps[None]:
-        """Forget the reference."""
-        yield from self._carry_out('DROP')
+    drop_ref = directive('DROP', _nothing, _done)
+    mount_on_ref = directive('MOUNT', _nothing, _done)
+    unmount_from_ref = directive('UNMOUNT', _nothing, _done)
+    get_all_refs = directive('GET ALL REFS', _nothing, _texts)
 
-    @operation
-    def mount_on_ref(self) -> Steps[None]:
-        """Let only this client change the ontology."""
-        yield from self._carry_out('MOUNT')
-
-    @operation
-    def unmount_from_ref(self) -> Steps[None]:
-        """End `mount_on_ref`."""
-        yield from self._carry_out('UNMOUNT')
-
-    @operation
-    def get_all_refs(self) -> Steps[list[str]]:
-        """Yield names of all references."""
-        return (yield from self._carry_out('GET ALL REFS')).queried_objects
-
-    @operation
+    @operation('GET REF CLIENT')
     def get_ref_client(self, reference_name: str = '') -> Steps[str | None]:
-        """Yield the client mounted on a reference (the own one if none is named); None when nobody
+        """Return the client mounted on a reference (the own one if none is named); None when nobody
         is.
         """
         name = reference_name or self.client.reference_name
-        (mounted,) = (yield from self._carry_out('GET REF CLIENT', name)).queried_objects
+        (mounted,) = _texts((yield from self.carry_out('GET REF CLIENT', name)))
         return None if mounted == 'none' else mounted
 
-    @operation
+    @operation('LOG SCREEN ON', 'LOG SCREEN OFF')
     def set_log_to_terminal(self, switch: bool) -> Steps[None]:
         """Switch the server's log on its console."""
-        yield from self._carry_out(f'LOG SCREEN {"ON" if switch else "OFF"}')
+        yield from self.carry_out(f'LOG SCREEN {"ON" if switch else "OFF"}')
 
-    @operation
+    @operation('LOG FILE ON', 'LOG FILE OFF')
     def set_log_to_file(self, switch: bool, filepath: str = '') -> Steps[None]:
         """Switch the server's log to a file."""
-        if switch:
-            if not filepath:
-                raise ArmorServiceCallError('set_log_to_file: expected the path of a file')
-            yield from self._carry_out('LOG FILE ON', filepath)
-        else:
-            yield from self._carry_out('LOG FILE OFF')
+        if switch and not filepath:
+            raise ArmorServiceCallError('set_log_to_file: expected the path of a file')
+        yield from self.carry_out(*(('LOG FILE ON', filepath) if switch else ('LOG FILE OFF',)))
 
 
 class ArmorClient:
@@ -714,7 +614,7 @@ class ArmorClient:
             self.client_id, self.reference_name, command, primary, secondary, args
         )
 
-    @operation
+    @operation()
     def call(
         self, command: str, first_spec: str, second_spec: str, args_list: Sequence[str]
     ) -> Steps[DirectiveResponse]:
@@ -724,7 +624,7 @@ class ArmorClient:
         )
         return response
 
-    @operation
+    @operation()
     def batch(self, requests: Sequence[DirectiveRequest]) -> Steps[ListResponse]:
         """Carry out directives in order, with no other client's in between."""
         answer: ListResponse = yield requests

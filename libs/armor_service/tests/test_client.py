@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
+from inspect import signature
 from typing import Any
 
 import pytest
@@ -14,7 +15,13 @@ from armor_service.client import (
     ArmorServiceCallError,
     ArmorServiceInternalError,
     InProcessTransport,
+    Manipulation,
+    Operation,
+    Query,
+    Utils,
 )
+from armor_service.directives import TABLE
+from armor_service.directives.table import Read
 from armor_service.protocol import (
     DirectiveRequest,
     DirectiveResponse,
@@ -139,6 +146,18 @@ def test_every_method_sends_what_armor_expects() -> None:
         'CLOSE OBJECTPROP IND': (lambda: change.close_objectprop('p', 'a'), ('p', 'a')),
         'CLOSE CLASS': (lambda: change.close_class('A'), ('A',)),
         'CLOSE CLASS IND': (lambda: change.close_class('A', 'a'), ('A', 'a')),
+        'SET OBJECTPROP IND': (
+            lambda: change.set_objectprop_of_ind('p', 'a', 'b'),
+            ('p', 'a', 'b'),
+        ),
+        'SET DATAPROP IND': (
+            lambda: change.set_dataprop_of_ind('p', 'a', 'LONG', '1'),
+            ('p', 'a', 'LONG', '1'),
+        ),
+        'QUERY UNSUPPORTED': (lambda: ask.unsupported(), ()),
+        'QUERY EXPLAIN': (lambda: ask.explain('A(a)'), ('A(a)',)),
+        'BACKUP': (lambda: use.backup('f'), ('f',)),
+        'GET REF CLIENT': (lambda: use.get_ref_client('map'), ('map',)),
         'CANCEL': (lambda: use.cancel(), ()),
         'APPLY': (lambda: use.apply_buffered_changes(), ()),
         'REASON': (lambda: use.sync_buffered_reasoner(), ()),
@@ -161,15 +180,23 @@ def test_every_method_sends_what_armor_expects() -> None:
         'LOG FILE ON': (lambda: use.set_log_to_file(True, 'f'), ('f',)),
         'LOG FILE OFF': (lambda: use.set_log_to_file(False), ()),
     }
+    answers = {'QUERY EXPLAIN': ['why', 'tree'], 'GET REF CLIENT': ['you']}
     for words, (send, args) in expected.items():
         recorder.sent.clear()
+        recorder.answer.queried_objects = answers.get(words, [])
         send()
         assert recorder.sent == [(words, args)]
+    recorder.answer.queried_objects = []
+    # What has no method: other spellings of the same, forms of answers, and what allow_web allows.
+    assert {row.words for row in TABLE.values()} - set(expected) == {
+        *('ADD MIN CARDINALITY', 'MAKE EQUIVALENT', 'QUERY SPARQL', 'QUERY SPARQL FORMATTED'),
+        *('LOAD WEB', 'LOAD WEB MOUNTED', 'INVALID COMMAND'),
+    }
     for send, sent in (
         (lambda: ask.bottom_class_of_ind('a'), [('QUERY CLASS IND', ('a', 'true'))]),
         (lambda: ask.sparql('SELECT'), [('QUERY SPARQL ROWS', ('SELECT', '0'))]),
         (lambda: use.save('f', inference=True), [('SAVE INFERENCE', ('f',))]),
-        (lambda: use.reason_within(2), [('REASON', ('2.0',))]),
+        (lambda: use.reason_within(2), [('REASON', ('2',))]),
         (
             lambda: use.load_ref_from_file('f', 'iri', buffered_reasoner=True),
             [('LOAD FILE', ('f', 'iri', 'False', 'PELLET', 'True'))],
@@ -191,6 +218,36 @@ def test_every_method_sends_what_armor_expects() -> None:
         recorder.sent.clear()
         send()
         assert recorder.sent == sent
+
+
+def test_every_method_is_in_the_table_and_takes_what_that_says() -> None:
+    rows = {row.words: row for row in TABLE.values()}
+    kinds = {
+        Read.INDIVIDUAL: {'ind_name', 'ind_names', 'value_obj_name', 'new_value', 'old_value'},
+        Read.CLASS: {'class_name', 'class_names', 'super_class_name', 'value_class_name'},
+        Read.OBJECT_PROPERTY: {'objectprop_name'},
+        Read.DATA_PROPERTY: {'dataprop_name'},
+        Read.TYPE: {'value_type'},
+        Read.NUMBER: {'cardinality'},
+        Read.VALUE: {'value', 'new_value'},
+        Read.STORED: {'value', 'old_value'},
+    }
+    for part in (Manipulation, Query, Utils):
+        for name, method in vars(part).items():
+            if not isinstance(method, Operation):
+                continue
+            assert set(method.words) <= set(rows), name
+            assert method.help, name
+            taken = [one for one in signature(method.takes).parameters if one != 'with_URI']
+            if taken[:1] == ['self']:
+                continue  # It is more than one directive.
+            row = rows[method.words[-1]]
+            assert len(taken) >= row.required, name
+            for one, argument in zip(taken, row.arguments, strict=False):
+                assert one in kinds.get(argument.read, {one}) | {'old_name', 'new_name'}, (
+                    name,
+                    one,
+                )
 
 
 ENTITIES = ['<http://x.org/o#A>', 'owl:Nothing', '<http://x.org/o#B>']
@@ -277,9 +334,12 @@ def test_a_refusal_is_told_from_an_empty_answer() -> None:
 
 def test_an_operation_is_known_by_its_name_and_its_words() -> None:
     client = ArmorClient('me', 'map', Recorder())
-    assert vars(client.query.rules)['__name__'] == 'rules'
-    assert (client.query.rules.__doc__ or '').startswith('Yield the rules')
-    assert (type(client.query).rules.__doc__ or '').startswith('Yield the rules')
+    assert (
+        client.query.rules.__doc__ == 'The rules, one each, as ADD RULE and REMOVE RULE take them.'
+    )
+    assert client.query.explain.__doc__ == type(client.query).explain.help
+    assert type(client.query).explain.help.startswith('Return why a fact')
+    assert str(signature(client.query.axioms)) == "(name: 'str')"
     with pytest.raises(TypeError):
         client.query.rules('too many')  # type: ignore[call-arg]
     sent = client.request('ADD IND', 'a', 'b')
