@@ -6,7 +6,7 @@
 Runs the whole stack in one process as fast as it goes, makes trouble through the simulator's
 services, and watches from outside: collisions, the battery, what the ontology says about where the
 robot is beside where it really is, how many drives arrive, and how long each place waits. Ctrl-C or
-SIGTERM ends a run early; it reports what it saw. The exit code is 1 when a promise was broken.
+SIGTERM ends a run early; it reports what it saw. The exit code is 1 when something failed.
 """
 
 from __future__ import annotations

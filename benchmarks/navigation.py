@@ -680,7 +680,7 @@ class Leg:
     seconds: float
     metres: float
     stop: float
-    promised: float
+    told: float
 
 
 def mission(place: Path, seconds: float, *, real_time: bool = False) -> list[Leg]:
@@ -711,7 +711,7 @@ def legs_of(record: Path) -> list[Leg]:
         kinds = [each['event'] for each in (decision, visit, after)]
         if kinds != ['decision', 'visit', 'decision'] or visit['place'] != decision['place']:
             continue
-        promised = re.search(r'longest wait on this round is ([0-9.]+) s', after['reason'])
+        told = re.search(r'longest wait on this round is ([0-9.]+) s', after['reason'])
         legs.append(
             Leg(
                 at,
@@ -720,7 +720,7 @@ def legs_of(record: Path) -> list[Leg]:
                 visit['time'] - decision['time'],
                 visit['distance'],
                 after['time'] - visit['time'],
-                float(promised[1]) if promised else math.nan,
+                float(told[1]) if told else math.nan,
             )
         )
     return legs
@@ -786,7 +786,7 @@ def times(size: Size) -> None:
                 wrong.append(abs(expected / leg.seconds - 1.0))
                 kept += leg.seconds <= late * expected
                 learned.observe(leg.start, leg.goal, leg.seconds, straight, leg.metres)
-            promised, longest = longest_wait(legs)
+            told, longest = longest_wait(legs)
             rows.append(
                 (
                     name,
@@ -794,16 +794,16 @@ def times(size: Size) -> None:
                     f'{median(wrong):.1%}',
                     f'{np.percentile(wrong, 90):.1%}',
                     f'{kept / len(legs):.1%}',
-                    f'{promised:.0f}',
+                    f'{told:.0f}',
                     f'{longest:.0f}',
-                    f'{longest / promised:.2f}',
+                    f'{longest / told:.2f}',
                 )
             )
     print_table(
         f'{seconds:.0f} simulated seconds of patrol: how wrong the expected time of each leg is '
         'before it is driven,\nhow many keep to the time that 99 of 100 should keep to, and the '
         'longest wait from visit to visit in the second half.',
-        ('place', 'legs', 'wrong by', '90 %', 'within p99', 'wait: promised', 'driven', 'ratio'),
+        ('place', 'legs', 'wrong by', '90 %', 'within p99', 'wait: told', 'driven', 'ratio'),
         rows,
     )
 
@@ -826,7 +826,7 @@ def places_to_patrol(folder: Path) -> list[tuple[str, Path]]:
 
 
 def longest_wait(legs: Sequence[Leg]) -> tuple[float, float]:
-    """Return the longest wait that the mission promises when half is over, and the driven one."""
+    """Return the longest wait that the mission tells when half is over, and the driven one."""
     half = (legs[0].begun + legs[-1].begun) / 2
     seen: dict[str, float] = {}
     waits = [0.0]
@@ -835,8 +835,8 @@ def longest_wait(legs: Sequence[Leg]) -> tuple[float, float]:
         if leg.goal in seen and arrived > half:
             waits.append(arrived - seen[leg.goal])
         seen[leg.goal] = arrived + leg.stop
-    promises = [leg.promised for leg in legs if leg.begun > half and not math.isnan(leg.promised)]
-    return (median(promises) if promises else math.nan), max(waits)
+    bounds = [leg.told for leg in legs if leg.begun > half and not math.isnan(leg.told)]
+    return (median(bounds) if bounds else math.nan), max(waits)
 
 
 SECTIONS: dict[str, Callable[..., None]] = {

@@ -48,10 +48,10 @@ from patrol_policy.graph import (
     graph_of_places,
 )
 from patrol_policy.hours import Calendar, WeeklyHours
+from patrol_policy.idleness_bounds import LATER, NEVER, WITHIN, idleness_bounds
 from patrol_policy.lower_bounds import charge_bound, default_table, rule_bound
 from patrol_policy.patrolling_sim import read_patrolling_sim
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES
-from patrol_policy.promises import LATER, NEVER, WITHIN, promises
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import (
     Patrol,
@@ -350,7 +350,7 @@ def with_battery(count: int, states: int) -> None:
     """Compare with the bound that knows rules and charge, on random maps and batteries.
 
     Maps of 5 to 12 places, ranges of 1.2 to 20 tours, stops of 2 to 300 s, charges of 0 to 2 tours.
-    What was promised before is compared with what came.
+    The idleness bound told before is compared with what came.
     """
     ratios, starved, broken, kept_after_all, never = [], 0, 0, 0, 0
     proven = 0
@@ -367,7 +367,8 @@ def with_battery(count: int, states: int) -> None:
         run = Patrol(graph, Priorities(), DEFAULT_POLICY, factor * tour, place.start, battery)
         run.level = battery.limits.stop_recharge
         told = {
-            each.place: each for each in promises(run.world(), run.known_battery(), run.settings)
+            each.place: each
+            for each in idleness_bounds(run.world(), run.known_battery(), run.settings)
         }
         period = (1.0 + charge) * max(1.0, factor) * tour
         for _ in run.until(6.0 * period):
@@ -405,8 +406,8 @@ def with_battery(count: int, states: int) -> None:
     print(
         f'{len(ratios)} maps: median {ratios[len(ratios) // 2]:.3f}, worst {ratios[-1]:.3f}; '
         f'bound exact on {proven} (*), a lower bound on the others\n'
-        f'places never visited though they can be: {starved}; promised and not kept: {broken}; '
-        f'not promised and kept: {kept_after_all}; rightly told to be out of range: {never}'
+        f'places never visited though they can be: {starved}; bound told and not kept: {broken}; '
+        f'no bound told, and kept: {kept_after_all}; rightly told to be out of range: {never}'
     )
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 
 from patrol_policy.battery import Battery
 from patrol_policy.decision import DecisionSettings, tour_warning
+from patrol_policy.idleness_bounds import IdlenessBound, idleness_bounds, summary, verdicts
 from patrol_policy.plan import LEG_CHANGE
-from patrol_policy.promises import Promise, promises, summary, verdicts
 from patrol_policy.situation import Situation
 from state_machines import Interrupt
 from strict_files.suggestions import nearest
@@ -65,7 +65,7 @@ class SettingsCheck:
                 )
 
 
-class PromiseTeller:
+class IdlenessReporter:
     """Says what can be kept of the places, at the start and when what it rests on changes.
 
     Args:
@@ -74,7 +74,7 @@ class PromiseTeller:
         publish: Given all of them, whenever they are found anew.
 
     Attributes:
-        promised: What can be kept of each place, as was found last.
+        bounds: Of each place, as found last.
         publish: As given.
     """
 
@@ -82,9 +82,9 @@ class PromiseTeller:
         self,
         settings: DecisionSettings,
         tell: Callable[[str], None],
-        publish: Callable[[tuple[Promise, ...]], None],
+        publish: Callable[[tuple[IdlenessBound, ...]], None],
     ) -> None:
-        self.promised: tuple[Promise, ...] = ()
+        self.bounds: tuple[IdlenessBound, ...] = ()
         self._settings = settings
         self.publish = publish
         self._say = tell
@@ -116,7 +116,7 @@ class PromiseTeller:
         )
         if (plan, rests_on) == self._rested_on:
             return
-        found = self.promised = promises(world, battery, settings, sorted(places))
+        found = self.bounds = idleness_bounds(world, battery, settings, sorted(places))
         # The first time there was no plan yet.
         self._rested_on = (world.memory.planner, rests_on)
         self.publish(found)

@@ -9,7 +9,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point as PointMessage
 
-from patrol_policy.promises import CLOSED, LATER, NEVER, UNKNOWN, WITHIN, Promise
+from patrol_policy.idleness_bounds import CLOSED, LATER, NEVER, UNKNOWN, WITHIN, IdlenessBound
 from patrol_policy.situation import Decision
 from surveillance_behaviour.map_from_markers.assembly import PlaceNote
 from surveillance_behaviour.ports import Check, Doubt, Point
@@ -55,8 +55,8 @@ _LEVELS = {
 }
 
 
-def promises_message(
-    promises: Sequence[Promise], hours: Mapping[str, str], stamp: Any
+def idleness_bounds_message(
+    bounds: Sequence[IdlenessBound], hours: Mapping[str, str], stamp: Any
 ) -> DiagnosticArray:
     """Return what can be kept of the places: a status each, with the hours of those that have some.
 
@@ -65,7 +65,7 @@ def promises_message(
     """
     message = DiagnosticArray()
     message.header.stamp = stamp
-    for each in promises:
+    for each in bounds:
         values = {'threshold': f'{each.threshold:g}', 'wait': f'{each.wait:g}'}
         values |= {'hours': hours.get(each.place, ''), 'verdict': each.verdict}
         message.status.append(
@@ -79,14 +79,18 @@ def promises_message(
     return message
 
 
-def promises_from(message: DiagnosticArray) -> tuple[tuple[Promise, ...], dict[str, str]]:
+def idleness_bounds_from(
+    message: DiagnosticArray,
+) -> tuple[tuple[IdlenessBound, ...], dict[str, str]]:
     """Return what can be kept of the places, and the hours of those that have some.
 
     Raises:
         ValueError: There are more than any map has, or a value is none.
     """
     if len(message.status) > MOST_CANDIDATES:
-        raise ValueError(f'{len(message.status)} promises: expected at most {MOST_CANDIDATES}')
+        raise ValueError(
+            f'{len(message.status)} idleness bounds: expected at most {MOST_CANDIDATES}'
+        )
     verdicts = {level: verdict for verdict, level in _LEVELS.items()}
     found, hours = [], {}
     for each in message.status:
@@ -98,11 +102,11 @@ def promises_from(message: DiagnosticArray) -> tuple[tuple[Promise, ...], dict[s
                 verdict = verdicts[each.level]
         except (KeyError, ValueError):
             raise ValueError(
-                f'promise of {each.name!r}: expected a level and numbers threshold and wait'
+                f'idleness bound of {each.name!r}: expected a level and numbers threshold and wait'
             ) from None
         if not (threshold >= 0.0 and wait >= 0.0):
-            raise ValueError(f'promise of {each.name!r}: expected times of 0 or more')
-        found.append(Promise(each.name, verdict, threshold, wait, each.message))
+            raise ValueError(f'idleness bound of {each.name!r}: expected times of 0 or more')
+        found.append(IdlenessBound(each.name, verdict, threshold, wait, each.message))
         if values.get('hours'):
             hours[each.name] = values['hours']
     return tuple(found), hours

@@ -30,10 +30,10 @@ from patrol_policy.decision import (
     why_not,
 )
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from patrol_policy.situation import Decision, PolicyMemory, Situation
 from state_machines import Interrupt
-from surveillance_behaviour.announcements import PromiseTeller, SettingsCheck
+from surveillance_behaviour.announcements import IdlenessReporter, SettingsCheck
 from surveillance_behaviour.charging import BatteryMonitor
 from surveillance_behaviour.learned_times import LearnedTimes, LegTimer
 from surveillance_behaviour.ontology_view import OntologyView
@@ -61,7 +61,7 @@ class DecisionMaker:
             None: by the times that are told.
         rules: What holds for single places.
         tell: Told what can be kept of the places, at the start and when that changes.
-        promise: Given the same for each place, whenever what it rests on changes.
+        publish_bounds: Given the same for each place, whenever what it rests on changes.
         stations: The stations by their places, with rates that count until they are seen.
         traffic: The robot's way among those of its fleet; default: it is alone.
         sweeps: Returns how long each place that is swept takes, seconds, as far as is known.
@@ -71,7 +71,7 @@ class DecisionMaker:
         learned: That.
         traffic: That.
         place: Where the robot is, as far as was heard.
-        promises: What can be kept of each place.
+        idleness: Tells how long each place will wait.
         stations: The stations by their places.
         world: What was known at the last look; None: there was none.
     """
@@ -91,7 +91,7 @@ class DecisionMaker:
         tell: Callable[[str], None] = lambda sentence: None,
         stations: Mapping[str, Station] | None = None,
         traffic: Traffic | None = None,
-        promise: Callable[[tuple[Promise, ...]], None] = lambda found: None,
+        publish_bounds: Callable[[tuple[IdlenessBound, ...]], None] = lambda found: None,
         sweeps: Callable[[], Mapping[str, float]] = dict,
     ) -> None:
         self.settings = settings
@@ -103,7 +103,7 @@ class DecisionMaker:
         self._view = OntologyView(ontology, settings, self.traffic.others_visits, warn, tell)
         self._map = PatrolMap(places, settings, self.learned.leg_times, sweeps)
         self._check = SettingsCheck(settings, warn)
-        self.promises = PromiseTeller(settings, tell, promise)
+        self.idleness = IdlenessReporter(settings, tell, publish_bounds)
         self._leg = LegTimer(elapsed)
         self._battery = battery
         self._memory = PolicyMemory(generator or random.Random())
@@ -146,9 +146,9 @@ class DecisionMaker:
         return self._map.graph
 
     @property
-    def promised(self) -> tuple[Promise, ...]:
+    def idleness_bounds(self) -> tuple[IdlenessBound, ...]:
         """What can be kept of each place, as was found last."""
-        return self.promises.promised
+        return self.idleness.bounds
 
     def battery(self) -> Battery:
         """Return what a decision knows of the battery now."""
@@ -250,7 +250,7 @@ class DecisionMaker:
             CallError: The ontology cannot be asked.
         """
         world = self.look(now, interrupt)
-        self.promises.tell(world, self.battery(), self.places, self._rules)
+        self.idleness.tell(world, self.battery(), self.places, self._rules)
         return world.place
 
     def decide(
@@ -289,7 +289,7 @@ class DecisionMaker:
         battery = self.battery()
         decision = self._decided(world, battery)
         # Of the same plan: nothing is planned for it.
-        self.promises.tell(world, self.battery(), self.places, self._rules)
+        self.idleness.tell(world, self.battery(), self.places, self._rules)
         why, is_new = '', decision.rule == RECHARGE and not learned.sent_to_charge
         if is_new:
             why = why_charge(world, battery, self.settings)

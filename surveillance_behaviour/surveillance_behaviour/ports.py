@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
@@ -93,7 +93,7 @@ class Reasoner(Protocol):
         """All places of the map, as far as is known."""
 
     @property
-    def promised(self) -> tuple[Promise, ...]:
+    def idleness_bounds(self) -> tuple[IdlenessBound, ...]:
         """What can be kept of each place, as far as is known."""
         return ()
 

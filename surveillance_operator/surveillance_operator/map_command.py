@@ -22,8 +22,8 @@ from floor_plans.filter_masks import write_filter_masks
 from patrol_policy.battery import Battery, ChargeCurve, Draw
 from patrol_policy.decision import LONGEST_THRESHOLD, DecisionSettings
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.promises import Promise, promises
-from patrol_policy.promises import lines as promise_lines
+from patrol_policy.idleness_bounds import IdlenessBound, idleness_bounds
+from patrol_policy.idleness_bounds import lines as bound_lines
 from patrol_policy.situation import Situation
 from strict_files.files import FileError
 from surveillance_behaviour.mission import mission_log
@@ -40,9 +40,9 @@ Way = list[Spot]
 _SUFFIXES = ('.png', '.jpg', '.jpeg', '.webp')
 
 
-def promised(
+def expected_idleness(
     file: PlaceFile, threshold: float, battery_seconds: float | None, now: float
-) -> tuple[Promise, ...]:
+) -> tuple[IdlenessBound, ...]:
     """Return what can be kept of a place's rooms.
 
     Legs take what the way over the doors takes at the speed that a robot is given before it has
@@ -82,7 +82,7 @@ def promised(
         rates = {room: s.rate / 60.0 for room, s in file.plan.stations.items() if s.rate}
         curves = {room: ChargeCurve.even(rate) for room, rate in rates.items()}
         battery = Battery(100.0, draw=Draw(100.0 / battery_seconds), curves=curves)
-    return promises(world, battery, settings, sorted(place.rooms))
+    return idleness_bounds(world, battery, settings, sorted(place.rooms))
 
 
 def run_of(events: Sequence[event_log.RecordEntry], place: Place, source: str) -> DrivenRun:
@@ -239,11 +239,11 @@ def _draw(options: argparse.Namespace) -> list[str]:
                 f'expected the record of a run through {", ".join(plan.place.rooms)}'
             )
         lines.append(f'{options.record}: {run.summary}')
-        told = mission_log.last_promises(event_log.read(record))
-        lines += promise_lines(told) if told else []
+        told = mission_log.last_idleness_bounds(event_log.read(record))
+        lines += bound_lines(told) if told else []
     elif options.threshold is not None:
-        found = promised(file, options.threshold, options.charge_lasts, time.time())
-        lines += promise_lines(found)
+        found = expected_idleness(file, options.threshold, options.charge_lasts, time.time())
+        lines += bound_lines(found)
     elif options.charge_lasts is not None:
         raise ValueError('--charge-lasts: expected --threshold, too')
     title = options.place.stem.replace('_', ' ')

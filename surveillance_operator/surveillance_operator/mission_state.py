@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from floor_plans import Grid, Zone
 from floor_plans.shapes import Segment
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from patrol_policy.situation import Decision
 from surveillance_runtime.incidents import Cause, IncidentUpdate
 
@@ -161,7 +161,7 @@ class TaskView:
         threshold, policy: The behaviour's parameters.
         status: The latest `mission_status`, kept when its node ends.
         decision, decision_number: The latest decision, and its number.
-        promises, hours: What can be kept of each place, and the hours of those that have some.
+        idleness_bounds, hours: Of each place, and the hours of those that have some.
         requests: What each controller in MANUAL mode announced last.
         share: What it tells the other robots of a fleet; None: there are none.
         stopped: Whether a person has stopped the robot.
@@ -174,7 +174,7 @@ class TaskView:
     status: Status | None = None
     decision: Decision | None = None
     decision_number: int = 0
-    promises: tuple[Promise, ...] = ()
+    idleness_bounds: tuple[IdlenessBound, ...] = ()
     hours: Mapping[str, str] = field(default_factory=dict)
     requests: Mapping[str, str] = field(default_factory=dict)
     share: PatrolShare | None = None

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from floor_plans import Grid
+from patrol_policy.idleness_bounds import IdlenessBound
+from patrol_policy.idleness_bounds import lines as bound_lines
 from patrol_policy.policies import POLICIES
-from patrol_policy.promises import Promise
-from patrol_policy.promises import lines as promise_lines
 from surveillance_operator.figures import figures_line, figures_of
 from surveillance_operator.mission_state import (
     NO_POINTS,
@@ -78,7 +78,7 @@ def _decision(state: MissionState) -> Any:
     return {**vars(decision), **more}
 
 
-def _promises(state: MissionState) -> Any:
+def _idleness_bounds(state: MissionState) -> Any:
     return {
         each.place: {
             'verdict': each.verdict,
@@ -91,10 +91,10 @@ def _promises(state: MissionState) -> Any:
     }
 
 
-def _kept(state: MissionState) -> list[Promise]:
+def _kept(state: MissionState) -> list[IdlenessBound]:
     """Return what can be kept of each place; none of a place that was removed meanwhile."""
     there = state.place.positions
-    return [each for each in state.task.promises if not there or each.place in there]
+    return [each for each in state.task.idleness_bounds if not there or each.place in there]
 
 
 def _seconds(value: float) -> float | None:
@@ -230,9 +230,9 @@ PARTS: Mapping[str, Callable[[MissionState], Any]] = {
     ],
     'brief': lambda s: figures_line(s, brief=True),
     'decision': _decision,
-    'promises': _promises,
+    'idleness_bounds': _idleness_bounds,
     # As the log says it: a place that is late by little is no trouble.
-    'kept': lambda s: promise_lines(kept)[0] if (kept := _kept(s)) else None,
+    'kept': lambda s: bound_lines(kept)[0] if (kept := _kept(s)) else None,
     'grid': lambda s: _grid(s.place.grid),
     'places': _places,
     'regions': _regions,

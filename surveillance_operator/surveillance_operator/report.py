@@ -19,7 +19,7 @@ from pathlib import Path
 from floor_plans import FloorPlan, read_place
 from floor_plans.drawing import DrivenRun, draw_place
 from floor_plans.facts import counted, facts, graph_over_doors
-from patrol_policy.promises import lines as promise_lines
+from patrol_policy.idleness_bounds import lines as bound_lines
 from strict_files.files import FileError, replace_text
 from surveillance_behaviour.mission import mission_log
 from surveillance_operator.map_command import in_words, run_of
@@ -337,7 +337,7 @@ def _page(folder: Path, happened: RunEntries, drawn: str, bound: float | None) -
             f'{_clock(begin - start)}. What came before is in {RECORD}.*.gz.</p>'
         )
     body.append(drawn)
-    body.append(_promises(events))
+    body.append(_idleness_bounds(events))
     body.append('<h2>Idleness</h2>')
     body.append(_idleness(events, summary, threshold, begin, end))
     counts = {
@@ -387,12 +387,12 @@ def _document(folder: Path, body: Sequence[str]) -> str:
     )
 
 
-def _promises(events: Sequence[RecordEntry]) -> str:
+def _idleness_bounds(events: Sequence[RecordEntry]) -> str:
     """Return what was said last of what can be kept of each place."""
-    found = mission_log.last_promises(events)
+    found = mission_log.last_idleness_bounds(events)
     if not found:
         return ''
-    first, *rest = promise_lines(found)
+    first, *rest = bound_lines(found)
     rows = [[each.place, each.verdict, each.words] for each in found[:MOST_LINES]]
     head = f'What could be kept: {escape(first)}'
     opened = ' open' if rest else ''

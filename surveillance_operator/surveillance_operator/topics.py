@@ -25,7 +25,7 @@ from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import Bool, String, UInt8
 
 from armor_service.facts import ShortFact, parse_fact
-from surveillance_behaviour.conversions import decision_from, promises_from
+from surveillance_behaviour.conversions import decision_from, idleness_bounds_from
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
     Decision,
@@ -550,9 +550,9 @@ def _on_decision(message: Decision, _: MissionState) -> Fields:
     return {'decision': decision_from(message), 'decision_number': message.sequence}
 
 
-def _on_promises(message: DiagnosticArray, _: MissionState) -> Fields:
-    promises, hours = promises_from(message)
-    return {'promises': promises, 'hours': hours}
+def _on_idleness_bounds(message: DiagnosticArray, _: MissionState) -> Fields:
+    idleness_bounds, hours = idleness_bounds_from(message)
+    return {'idleness_bounds': idleness_bounds, 'hours': hours}
 
 
 def _on_machine(message: FsmStatus, _: MissionState) -> dict[str, Any]:
@@ -564,7 +564,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic('mission_status', MissionStatus, _sets('status', status_from)),
     Topic('decision', Decision, _on_decision),
     Topic('robot_place', RobotPlace, lambda m, _: {'robot_place': m.place}),
-    Topic('promises', DiagnosticArray, _on_promises),
+    Topic('idleness_bounds', DiagnosticArray, _on_idleness_bounds),
     Topic('battery_level', UInt8, _sets('battery', percent_from)),
     Topic('battery_low', Bool, lambda m, _: {'battery_low': m.data}),
     Topic('stopped', Bool, lambda m, _: {'stopped': m.data}),

@@ -135,7 +135,7 @@ KINDS: Mapping[str, EntryKind] = {
         section=Section('Visits', ('place', 'distance')),
         words=('place',),
     ),
-    'promises': EntryKind(('places',)),
+    'idleness_bounds': EntryKind(('places',)),
     'end': EntryKind(()),
     'snapshot': EntryKind(('account',)),
     'incident': EntryKind(

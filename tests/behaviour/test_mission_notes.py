@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_behaviour.mission.mission_notes import MissionNotes
@@ -22,12 +22,12 @@ def test_only_what_has_changed_is_written_again(tmp_path: Path) -> None:
         notes = MissionNotes(record, lambda: 1.0, lambda _: None)
         notes.write('end')  # before the start
         assert notes.start('patrol', 'E', PLACES, 90.0) is None
-        promise = Promise('C1', 'kept', 90.0, float('inf'), 'below 90 s')
+        bound = IdlenessBound('C1', 'kept', 90.0, float('inf'), 'below 90 s')
         for places, threshold in ((PLACES, 90.0), (PLACES | {'R1'}, 60.0)):
             notes.decided('C1', 'URGENT', 'it waits', places, threshold)
-            notes.promised((promise,))
+            notes.idleness_bounds((bound,))
     names = [each.name for each in read(tmp_path / 'record')]
-    assert names == ['start', 'decision', 'promises', 'map', 'decision']
+    assert names == ['start', 'decision', 'idleness_bounds', 'map', 'decision']
     *_, last = read(tmp_path / 'record')
     assert last.fields['urgency_threshold'] == 60.0
 

@@ -9,10 +9,10 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
-from patrol_policy.promises import WITHIN, Promise
+from patrol_policy.idleness_bounds import WITHIN, IdlenessBound
 from patrol_policy.situation import Decision
 from state_machines.exceptions import CallError, CallInterruptedError
-from surveillance_behaviour.conversions import promises_from
+from surveillance_behaviour.conversions import idleness_bounds_from
 from surveillance_behaviour.reasoner_node import Reasoner
 from surveillance_interfaces.srv import Reason
 from surveillance_runtime.qos import STATE_QOS
@@ -92,17 +92,19 @@ def test_a_choice_that_ends_with_its_node_is_no_failure(graph: Any, monkeypatch:
     assert not warned
 
 
-def test_the_hours_of_a_place_that_was_changed_are_told_with_the_promises(graph: Any) -> None:
+def test_the_hours_of_a_place_that_was_changed_are_told_with_the_bounds(
+    graph: Any,
+) -> None:
     reasoner = graph.add(Reasoner)
     model, told = reasoner.decision_maker, list[DiagnosticArray]()
-    graph.node.create_subscription(DiagnosticArray, 'promises', told.append, STATE_QOS)
+    graph.node.create_subscription(DiagnosticArray, 'idleness_bounds', told.append, STATE_QOS)
     places = graph.node.create_publisher(String, 'place', STATE_QOS)
     described = {'room_positions': {'R1': [1.0, 1.0]}, 'hours': {'R1': 'mon-fri 08:00-18:00'}}
     places.publish(String(data=json.dumps(described)))
     graph.until(lambda: 'R1' in model.rules.calendar.hours)
-    model.promises.publish((Promise('R1', WITHIN, 60.0, 30.0, 'R1: visited'),))
+    model.idleness.publish((IdlenessBound('R1', WITHIN, 60.0, 30.0, 'R1: visited'),))
     graph.until(lambda: bool(told))
-    assert promises_from(told[-1])[1] == {'R1': 'mon-fri 08:00-18:00'}
+    assert idleness_bounds_from(told[-1])[1] == {'R1': 'mon-fri 08:00-18:00'}
 
 
 def test_a_robot_of_a_fleet_keeps_its_dock_when_the_place_is_changed(graph: Any) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from surveillance_interfaces.msg import MissionStatus, RobotPlace
 from surveillance_operator.console_node import status_line
 from surveillance_operator.fleet_table import fleet_lines
@@ -58,12 +58,12 @@ def test_that_the_robot_is_in_another_place_is_a_line_of_the_log() -> None:
 
 
 def test_a_place_that_was_removed_is_late_for_nobody() -> None:
-    promises = tuple(Promise(name, 'never', 60.0, 90.0, f'{name} is late') for name in ('A', 'B'))
-    state = RUNS.having(promises=promises, positions={'A': (0.0, 0.0), 'B': (1.0, 0.0)})
+    bounds = tuple(IdlenessBound(name, 'never', 60.0, 90.0, f'{name} is late') for name in 'AB')
+    state = RUNS.having(idleness_bounds=bounds, positions={'A': (0.0, 0.0), 'B': (1.0, 0.0)})
     patches = PatchMaker()
-    assert patches.patch(state)['promises'].keys() == {'A', 'B'}
+    assert patches.patch(state)['idleness_bounds'].keys() == {'A', 'B'}
     left = patches.patch(state.having(positions={'A': (0.0, 0.0)}))
-    assert left['promises'].keys() == {'A'}
+    assert left['idleness_bounds'].keys() == {'A'}
     assert 'B' not in left['kept']
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_state import (
     RECORD_OF,
@@ -52,8 +52,8 @@ INNER = {
 
 
 def test_each_field_of_a_state_is_shown_by_some_part_or_said_to_be_inner() -> None:
-    promise = Promise('A', 'within', 240.0, 60.0, 'A within 240 s')
-    state = whole().having(promises=(promise,))
+    bound = IdlenessBound('A', 'within', 240.0, 60.0, 'A within 240 s')
+    state = whole().having(idleness_bounds=(bound,))
     read = set(INNER) | set(RECORDS)
     for compute in PARTS.values():
         read |= traced(compute, state)[1].keys()

@@ -243,13 +243,13 @@ def test_what_cannot_be_kept_of_each_place_is_shown_with_its_hours(
             'hours': 'daily 08:00-18:00',
         },
     }
-    broadcaster.show_parts({'promises': told}, 0.0, whole=False)
+    broadcaster.show_parts({'idleness_bounds': told}, 0.0, whole=False)
     line = '1 of 2 places can be visited within their thresholds'
-    viewer.until(lambda: viewer.text('#promises-line') == line)
+    viewer.until(lambda: viewer.text('#idleness-line') == line)
     broadcaster.show_parts({'kept': 'all 2 places, or little later'}, 0.0, whole=False)
-    viewer.until(lambda: viewer.text('#promises-line') == 'all 2 places, or little later')
-    viewer.js('document.getElementById("promises").open = true')
-    assert viewer.text('#promises-list') == 'B: never visited (daily 08:00-18:00)A: in time'
+    viewer.until(lambda: viewer.text('#idleness-line') == 'all 2 places, or little later')
+    viewer.js('document.getElementById("idleness").open = true')
+    assert viewer.text('#idleness-list') == 'B: never visited (daily 08:00-18:00)A: in time'
 
 
 def test_no_name_becomes_markup_and_each_is_read(broadcaster: Broadcaster, viewer: Viewer) -> None:

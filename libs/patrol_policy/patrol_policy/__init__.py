@@ -6,7 +6,7 @@ places comes first is in `rule_table`, which of its places in `policies`; the ot
 these.
 
 Public modules: `battery`, `decision`, `fleet`, `graph`, `hours`, `lower_bounds`, `patrolling_sim`,
-`plan`, `policies`, `promises`, `rule_table`, `simulation`, `tour`, `situation`.
+`plan`, `policies`, `idleness_bounds`, `rule_table`, `simulation`, `tour`, `situation`.
 """
 
 from __future__ import annotations

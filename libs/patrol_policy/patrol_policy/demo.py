@@ -12,9 +12,9 @@ import sys
 from collections.abc import Sequence
 
 from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.idleness_bounds import idleness_bounds, lines
 from patrol_policy.lower_bounds import rule_bound
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES
-from patrol_policy.promises import lines, promises
 from patrol_policy.rule_table import DEFAULT_PRIORITIES, Priorities
 from patrol_policy.simulation import CORRIDOR, ROOM, Patrol
 from patrol_policy.situation import Situation
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     bound = rule_bound(graph, begin.table)
     print(f'the shortest tour takes {graph.tour.length:.0f} s; under these rules no robot can keep')
     print(f'all waits below {bound.low:.0f} s, and the threshold is {options.threshold:g} s.')
-    for line in lines(promises(begin, patrol.known_battery(), patrol.settings)):
+    for line in lines(idleness_bounds(begin, patrol.known_battery(), patrol.settings)):
         print(f'- {line}')
     for number in range(1, options.moves + 1):
         before, now = patrol.place, patrol.now

@@ -486,7 +486,7 @@ class Planner:
         Waits that come again and again count first, as far as they are longer than what is
         accepted, then those on the way into the cycle, which come once, then the first waits. A
         plan that takes the place of another has long waits behind it: if they counted as much, all
-        cycles would be alike, and the place would be promised what is left of them. Of a plan
+        cycles would be alike, and the place would get what is left of them as its bound. Of a plan
         that was looked at in part only nothing good is known.
         """
         bound = self._bound

@@ -6,8 +6,8 @@ A place's classes follow from what it is, save `URGENT`, which a place also beco
 each place has a rank, and a better one from the moment at which it is URGENT.
 
 Whoever asks what comes first asks a `RuleTable`: the decision, the search that looks ahead, the
-bounds, what is promised, the fleet and the simulation. `RuleTable.time_left` is the one function
-that computes whether a place is URGENT, `RuleTable.rank` the one comparison, and `RuleTable.first`
+lower bounds, idleness bounds, fleet and simulation. `RuleTable.time_left` is the one function that
+computes whether a place is URGENT, `RuleTable.rank` the one comparison, and `RuleTable.first`
 is where the first class wins. Places are indices here.
 
 **What was said.** The ontology has rules of its own that make a place URGENT: it was never visited,

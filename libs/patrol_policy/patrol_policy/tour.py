@@ -78,8 +78,7 @@ def shortest_tour(distances: Matrix) -> Tour:
     # measured one way.
     order = min(order, order[::-1], key=lambda way: tour_length(distances, way))
     length = tour_length(distances, order)
-    # The bound takes longer than the tour and is for benchmarks and promises: found when it is
-    # asked for.
+    # The bound takes longer than the tour and is for benchmarks: found when it is asked for.
     return Tour(order, length, lambda: _one_tree_bound(np.minimum(distances, distances.T), length))
 
 

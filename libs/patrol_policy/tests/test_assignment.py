@@ -30,7 +30,7 @@ from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, Outage
 from patrol_policy.graph import PatrolGraph, graph_of_places
 from patrol_policy.hours import Openings
-from patrol_policy.promises import promises
+from patrol_policy.idleness_bounds import idleness_bounds
 from patrol_policy.rule_table import Priorities
 from patrol_policy.situation import Situation
 
@@ -390,7 +390,7 @@ def fleet_world(robots: list[FleetRobot], **changes: object) -> Situation:
     )
 
 
-def test_promises_count_all_robots_and_their_charging() -> None:
+def test_idleness_bounds_count_all_robots_and_their_charging() -> None:
     settings = DecisionSettings(priorities=Priorities(()))
     places = ('E', 'R1', 'R4')
 
@@ -399,7 +399,7 @@ def test_promises_count_all_robots_and_their_charging() -> None:
         assert seen.fleet is not None
         changed = replace(seen.fleet.settings, charge_ratio=ratio)
         seen = replace(seen, fleet=replace(seen.fleet, settings=changed))
-        return {each.wait for each in promises(seen, Battery(), settings)}
+        return {each.wait for each in idleness_bounds(seen, Battery(), settings)}
 
     for count in (1, 3):
         robots = fleet(*places[:count])
@@ -409,15 +409,15 @@ def test_promises_count_all_robots_and_their_charging() -> None:
     assert max(waits(robots, 0.25)) == pytest.approx(1.25 * found)
     robots[1] = replace(robots[1], taken_out=True)
     seen = fleet_world(robots[:2])
-    words = [each.words for each in promises(seen, Battery(), settings)]
+    words = [each.words for each in idleness_bounds(seen, Battery(), settings)]
     assert all('by one of 1 robots' in each for each in words)
 
 
-def test_a_fleets_promise_knows_the_rules() -> None:
+def test_a_fleets_idleness_bound_knows_the_rules() -> None:
     robots = fleet('E', 'R4')
     settings = DecisionSettings(priorities=Priorities(('URGENT', 'CORRIDOR', 'ROOM')))
     seen = fleet_world(robots)
-    found = {each.place: each for each in promises(seen, Battery(), settings)}
+    found = {each.place: each for each in idleness_bounds(seen, Battery(), settings)}
     # A room is entered when it is URGENT, not before.
     assert 40.0 < found['R1'].wait < 40.0 + seven_rooms().tour.length
     classes = {place: kinds - {'URGENT'} for place, kinds in seen.classes.items()}
@@ -427,7 +427,7 @@ def test_a_fleets_promise_knows_the_rules() -> None:
     for place, wait in run.longest_waits(300.0).items():
         assert wait <= 1.1 * found[place].wait
     never = DecisionSettings(priorities=Priorities(('CORRIDOR', 'ROOM')))
-    found = {each.place: each for each in promises(seen, Battery(), never)}
+    found = {each.place: each for each in idleness_bounds(seen, Battery(), never)}
     assert (found['R1'].verdict, found['C2'].verdict) == ('never', 'within')
 
 

@@ -19,8 +19,8 @@ from patrol_policy.battery import (
 )
 from patrol_policy.decision import RECHARGE
 from patrol_policy.graph import PatrolGraph
+from patrol_policy.idleness_bounds import LATER, NEVER, WITHIN, idleness_bounds, summary
 from patrol_policy.lower_bounds import charge_bound
-from patrol_policy.promises import LATER, NEVER, WITHIN, promises, summary
 from patrol_policy.rule_graph import RuleGraph
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol, SimulatedBattery
@@ -303,12 +303,12 @@ def test_a_station_in_a_dead_end_is_entered_by_a_charge_before_it_is_urgent() ->
     assert list(rules.held_periods) == [graph.index['D']]
 
 
-def test_what_is_promised_is_what_comes() -> None:
+def test_the_idleness_bound_is_what_comes() -> None:
     for seed in range(3):
         draw = random.Random(seed)
         graph = seven_rooms(draw.uniform(2.0, 300.0))
         patrol = patrolled(graph, 0.9, draw.uniform(2.0, 15.0), draw.uniform(0.1, 2.0), 3.0)
-        told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+        told = idleness_bounds(patrol.world(), patrol.known_battery(), patrol.settings)
         assert all(each.verdict in (WITHIN, LATER) for each in told)
         patrol.run.waits.clear()
         for _ in range(200):
@@ -324,7 +324,7 @@ def test_it_says_beforehand_which_place_is_never_visited_and_what_would_help() -
     patrol = Patrol(graph, Priorities(), 'tour', 240.0, 'E', SimulatedBattery(100.0 / 860.0, 1.0))
     told = {
         each.place: each
-        for each in promises(patrol.world(), patrol.known_battery(), patrol.settings)
+        for each in idleness_bounds(patrol.world(), patrol.known_battery(), patrol.settings)
     }
     assert told['R4'].verdict == NEVER
     assert 'R4: never visited, out takes 612 s and home 12 s, which needs 91 % of charge' in (

@@ -24,7 +24,7 @@ from patrol_policy.fleet.charging_bound import charging_wait
 from patrol_policy.fleet.docks import DockSlot
 from patrol_policy.fleet.simulation import FleetBattery, FleetPatrol, FleetView, Outage
 from patrol_policy.graph import PatrolGraph
-from patrol_policy.promises import fleet_waits
+from patrol_policy.idleness_bounds import fleet_waits
 from patrol_policy.rule_table import Priorities
 from patrol_policy.situation import Situation
 from patrol_policy.tour import tour_length

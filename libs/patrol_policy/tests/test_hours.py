@@ -9,7 +9,7 @@ import pytest
 
 from patrol_policy.decision import QUIET
 from patrol_policy.hours import MAY, MUST, NOT, Calendar, WeeklyHours
-from patrol_policy.promises import CLOSED, LATER, WITHIN, lines, promises
+from patrol_policy.idleness_bounds import CLOSED, LATER, WITHIN, idleness_bounds, lines
 from patrol_policy.rule_table import Priorities
 from patrol_policy.simulation import Patrol
 
@@ -87,9 +87,9 @@ def test_a_place_that_is_open_for_less_than_a_round_is_visited_before_it_closes(
     assert (visited.hour, visited.minute) >= (8, 0)
 
 
-def test_what_opens_later_is_not_promised_before() -> None:
+def test_what_opens_later_has_no_bound_before() -> None:
     patrol = opened('daily 08:00-08:15', 200.0, 5, 0.001)
-    told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    told = idleness_bounds(patrol.world(), patrol.known_battery(), patrol.settings)
     by_place = {each.place: each for each in told}
     assert by_place['R3'].verdict == CLOSED
     assert by_place['R3'].words == (
@@ -97,7 +97,7 @@ def test_what_opens_later_is_not_promised_before() -> None:
     )
     assert 'R3' not in lines(told)[0]
     patrol.now += 3 * 3600.0
-    told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    told = idleness_bounds(patrol.world(), patrol.known_battery(), patrol.settings)
     by_place = {each.place: each for each in told}
     assert by_place['R3'].verdict in (WITHIN, LATER)
     assert ' while it is open' in by_place['R3'].words
@@ -162,11 +162,11 @@ def test_hours_that_are_changed_during_a_patrol_change_the_plan(before: str, aft
         )
 
     changed = patrol(before)
-    promises(changed.world(), changed.known_battery(), changed.settings)
+    idleness_bounds(changed.world(), changed.known_battery(), changed.settings)
     changed.calendar = calendar(after)
-    told = promises(changed.world(), changed.known_battery(), changed.settings)
+    told = idleness_bounds(changed.world(), changed.known_battery(), changed.settings)
     plan, fresh = changed.world().memory.planner, patrol(after)
-    promises(fresh.world(), fresh.known_battery(), fresh.settings)
+    idleness_bounds(fresh.world(), fresh.known_battery(), fresh.settings)
     assert plan.rule_graph.windows == fresh.world().memory.planner.rule_graph.windows
     assert {each.place for each in told if each.verdict == CLOSED} == {'R3'}
 
@@ -181,6 +181,6 @@ def test_what_the_quiet_hours_come_before_is_said_to_end_with_them() -> None:
     patrol = Patrol(
         seven_rooms(200.0), Priorities(), 'tour', 30.0, 'E', calendar=calendar, began=begin
     )
-    told = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+    told = idleness_bounds(patrol.world(), patrol.known_battery(), patrol.settings)
     words = {each.place: each.words for each in told}
     assert words['R3'] == 'R3: not visited before the quiet hours, which begin in 60 s'

@@ -212,20 +212,20 @@ DRIVEN = {
 
 
 @pytest.mark.parametrize('share', [0.5, 0.6, 1.3])
-def test_a_long_wait_of_the_first_lap_is_not_promised_for_ever(share: float) -> None:
+def test_a_long_wait_of_the_first_lap_is_no_bound_for_ever(share: float) -> None:
     """The robot learns on its first lap that legs take other times than it was told."""
     known = {leg: share * seconds for leg, seconds in DRIVEN.items()}
     patrol = Patrol(of_legs(known), Priorities(), 'tour', 240.0, station='E')
     knowing = Patrol(of_legs(DRIVEN), Priorities(), 'tour', 240.0, station='E')
     knowing.step()
-    promised = []
+    bounds = []
     for _ in range(30):
         here = patrol.place
         there = patrol.step().place
         known[here, there] = DRIVEN[here, there]
         patrol.graph = of_legs(known)
-        promised.append(max(patrol.planner.settled_waits()))
-    assert max(promised) <= 1.05 * max(knowing.planner.settled_waits())
+        bounds.append(max(patrol.planner.settled_waits()))
+    assert max(bounds) <= 1.05 * max(knowing.planner.settled_waits())
 
 
 def of_legs(legs: dict[tuple[str, str], float]) -> PatrolGraph:

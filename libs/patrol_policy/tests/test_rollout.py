@@ -1,4 +1,4 @@
-"""Rounds within the rules, and following them ahead: what is promised is what comes."""
+"""Rounds within the rules, and following them ahead: what is planned is what comes."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ def test_a_policy_followed_ahead_does_what_it_does_in_a_patrol(kind: str, factor
 
 
 @pytest.mark.parametrize('factor', [0.1, 1.25])
-def test_a_plan_keeps_what_it_promises(factor: float) -> None:
+def test_a_plan_keeps_its_bound(factor: float) -> None:
     graph = chain(6)
     threshold = factor * graph.tour.length
     patrol = Patrol(graph, Priorities(), 'tour', threshold, graph.places[0])
-    promised = Planner(patrol.world()).longest
+    planned = Planner(patrol.world()).longest
     for _ in patrol.until(12.0 * max(graph.tour.length, threshold)):
         pass
-    assert patrol.run.settled <= promised + 1e-6
+    assert patrol.run.settled <= planned + 1e-6
 
 
 @settings(max_examples=15)

@@ -25,9 +25,9 @@ from patrol_policy.fleet import FleetRobot, FleetSettings
 from patrol_policy.fleet.ruled import ruled
 from patrol_policy.fleet.simulation import FleetView
 from patrol_policy.hours import Openings
+from patrol_policy.idleness_bounds import LATER, UNKNOWN, idleness_bounds
 from patrol_policy.lower_bounds import possible_moves, rule_bound
 from patrol_policy.plan import Planner, planner_of
-from patrol_policy.promises import LATER, UNKNOWN, promises
 from patrol_policy.rollout import lookahead, oldest
 from patrol_policy.rule_graph import PatrolState, rule_graph
 from patrol_policy.rule_table import ALERT, ANY, HALF_OPEN, URGENT, ClassRule, Priorities, RuleTable
@@ -111,7 +111,7 @@ def urgent_now(known: Situation) -> dict[str, bool]:
 @settings(max_examples=250)
 @given(worlds_with_rules())
 def test_all_who_ask_what_comes_first_are_told_the_same(known: Situation) -> None:
-    """Decision, plan, searched rounds, bounds, simulation, fleet and promises."""
+    """Decision, plan, searched rounds, bounds, simulation, fleet and idleness bounds."""
     graph, index, here = known.graph, known.graph.index, known.place
     urgent = urgent_now(known)
     expected = in_plain_words(known, here, urgent)
@@ -234,7 +234,7 @@ def test_a_new_class_is_one_entry_that_all_follow() -> None:
     assert not plan.fits(sunday, None)
 
 
-def test_bounds_and_promises_follow_a_new_class() -> None:
+def test_bounds_and_idleness_bounds_follow_a_new_class() -> None:
     # A laboratory before all else for ever: whoever stands before it never comes past it.
     always = laboratory(('LAB', 'URGENT', 'CORRIDOR', 'ROOM'))
     usual = laboratory(('URGENT', 'CORRIDOR', 'ROOM'))
@@ -243,10 +243,10 @@ def test_bounds_and_promises_follow_a_new_class() -> None:
     # Nobody that obeys can ever have a short wait: there is no walk to be found.
     assert math.isinf(rule_bound(graph, always.table, states=2_000).high)
     settings = DecisionSettings(priorities=always.priorities)
-    told = {each.place: each.verdict for each in promises(always, Battery(), settings)}
+    told = {each.place: each.verdict for each in idleness_bounds(always, Battery(), settings)}
     assert (told['C2'], told['R1']) == ('within', UNKNOWN)
     settings = DecisionSettings(priorities=Priorities(ON_WEEKDAYS), urgency_threshold=240)
-    told = {each.place: each.verdict for each in promises(usual, Battery(), settings)}
+    told = {each.place: each.verdict for each in idleness_bounds(usual, Battery(), settings)}
     assert set(told.values()) <= {'within', LATER}
 
 

@@ -195,7 +195,7 @@ class Mission:
             reasoner.places,
             self.settings.choice.urgency_threshold,
         )
-        self.notes.promised(reasoner.promised)
+        self.notes.idleness_bounds(reasoner.idleness_bounds)
         return decision
 
     def _notice_place(self, interrupt: Interrupt) -> None:

@@ -14,7 +14,7 @@ seconds. The ``path`` was planned; ``driven`` is where the robot was, where the 
 tells it. An ``exploring`` may have ``bearing``: the camera had looked there then, whole degrees of
 the map frame, as the ``sides`` of a ``look`` are, with ``point`` where that was not the place's own
 one; or ``check``, by its name. To the ``unseen`` of a ``look`` the camera was turned, and nobody
-looked at a picture of it. ``promises`` says what can be kept of each place:
+looked at a picture of it. ``idleness_bounds`` says what can be kept of each place:
 ``place``, ``verdict``, ``words``, and ``threshold`` and ``wait`` in seconds, null where they have
 no end.
 
@@ -42,7 +42,7 @@ from pathlib import Path
 from typing import Any
 
 from patrol_policy.decision import RECHARGE
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from strict_files.files import FileError
 from surveillance_runtime.event_log import (
     A_DATE,
@@ -373,19 +373,19 @@ def on_present_clock(
     return {name: at + by for name, at in times.items()}
 
 
-def last_promises(events: Iterable[RecordEntry]) -> tuple[Promise, ...]:
+def last_idleness_bounds(events: Iterable[RecordEntry]) -> tuple[IdlenessBound, ...]:
     """Return what was said last of what can be kept; may be empty."""
-    found: tuple[Promise, ...] = ()
+    found: tuple[IdlenessBound, ...] = ()
     for event in events:
-        if event.name == 'promises' and isinstance(places := event.fields['places'], list):
-            found = tuple(filter(None, map(_promise, places)))
+        if event.name == 'idleness_bounds' and isinstance(places := event.fields['places'], list):
+            found = tuple(filter(None, map(_idleness_bound, places)))
     return found
 
 
-def _promise(kept: Any) -> Promise | None:
-    """Return a promise as the record keeps it, without bounds as null; None: it is none."""
+def _idleness_bound(kept: Any) -> IdlenessBound | None:
+    """Return an idleness bound as the record keeps it, without bounds as null; None: it is none."""
     if not isinstance(kept, dict) or not kept.keys() >= {
-        each.name for each in dataclasses.fields(Promise)
+        each.name for each in dataclasses.fields(IdlenessBound)
     }:
         return None
     numbers = (math.inf if kept[name] is None else kept[name] for name in ('threshold', 'wait'))
@@ -393,7 +393,9 @@ def _promise(kept: Any) -> Promise | None:
         threshold, wait = map(float, numbers)
     except (TypeError, ValueError):
         return None
-    return Promise(str(kept['place']), str(kept['verdict']), threshold, wait, str(kept['words']))
+    return IdlenessBound(
+        str(kept['place']), str(kept['verdict']), threshold, wait, str(kept['words'])
+    )
 
 
 def account_in(path: str | Path, left_out: UnreadLines | None = None) -> Account:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import CutOff, InspectionLog, MissionRecord
 
@@ -38,7 +38,7 @@ class MissionNotes:
         self._is_begun = False
         self._places: frozenset[str] = frozenset()
         self._threshold = 0.0
-        self._promises: Sequence[Promise] = ()
+        self._idleness_bounds: Sequence[IdlenessBound] = ()
         self._complaint = ''
 
     @property
@@ -85,12 +85,12 @@ class MissionNotes:
         self._threshold = threshold
         self.write('decision', place=place, rule=rule, reason=reason, **changed)
 
-    def promised(self, found: Sequence[Promise]) -> None:
+    def idleness_bounds(self, found: Sequence[IdlenessBound]) -> None:
         """Write what can be kept of the places, once its verdicts have changed."""
-        if _verdicts(found) == _verdicts(self._promises):
+        if _verdicts(found) == _verdicts(self._idleness_bounds):
             return
-        self._promises = found
-        self.write('promises', places=[_plain(each) for each in found])
+        self._idleness_bounds = found
+        self.write('idleness_bounds', places=[_plain(each) for each in found])
 
     def visited(
         self, place: str, distance: float, path: Sequence[Spot], driven: Sequence[Spot]
@@ -125,15 +125,15 @@ class MissionNotes:
             self._complaint = ''
 
 
-def _verdicts(promises: Iterable[Promise]) -> dict[str, str]:
-    return {each.place: each.verdict for each in promises}
+def _verdicts(bounds: Iterable[IdlenessBound]) -> dict[str, str]:
+    return {each.place: each.verdict for each in bounds}
 
 
-def _plain(promise: Promise) -> dict[str, object]:
-    """Return a promise as JSON has it; null: without an end."""
+def _plain(bound: IdlenessBound) -> dict[str, object]:
+    """Return an idleness bound as JSON has it; null: without an end."""
     return {
         name: None if isinstance(value, float) and math.isinf(value) else value
-        for name, value in vars(promise).items()
+        for name, value in vars(bound).items()
     }
 
 

@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool
 from floor_plans import Station
 from floor_plans.parameters import patrol_rules, stations_in
 from patrol_policy.decision import DecisionSettings
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from patrol_policy.situation import Decision
 from state_machines import Interrupt
 from state_machines.exceptions import CallError
@@ -88,7 +88,7 @@ def decision_maker_of(
         log.warn(learned.problem)
     generator = random.Random(memory.random_seed if memory.random_seed >= 0 else None)
     topic = OwnedTopic(node, DecisionMessage, 'decision')
-    promises_topic = OwnedTopic(node, DiagnosticArray, 'promises')
+    bounds_topic = OwnedTopic(node, DiagnosticArray, 'idleness_bounds')
     rules = described_patrol_rules(node)
     hours = rules.calendar.in_words()
     count, logged = 0, ''
@@ -114,9 +114,9 @@ def decision_maker_of(
     if fleet is not None:
         traffic = FleetTraffic(fleet, settings, _settle)
 
-    def promise(found: tuple[Promise, ...]) -> None:
+    def publish_bounds(found: tuple[IdlenessBound, ...]) -> None:
         stamp = node.get_clock().now().to_msg()
-        promises_topic.publish(conversions.promises_message(found, hours, stamp))
+        bounds_topic.publish(conversions.idleness_bounds_message(found, hours, stamp))
 
     decision_maker = DecisionMaker(
         settings,
@@ -132,7 +132,7 @@ def decision_maker_of(
         lambda sentence: log.info(sentence),
         stations,
         traffic,
-        promise,
+        publish_bounds,
         sweeps,
     )
     decision_maker.learn_draw(elapsed)

@@ -8,7 +8,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 
 from patrol_policy.decision import RECHARGE
-from patrol_policy.promises import Promise
+from patrol_policy.idleness_bounds import IdlenessBound
 from patrol_policy.rule_table import ANY
 from patrol_policy.situation import Decision
 from state_machines import Interrupt
@@ -48,23 +48,25 @@ class ReasonClient(Reasoner):
         self._places: frozenset[str] = frozenset()
         self._told = threading.Condition()
         self._decision: Decision | None = None
-        self._promised: tuple[Promise, ...] = ()
+        self._idleness_bounds: tuple[IdlenessBound, ...] = ()
         self._reason = ServiceCaller(node, Reason, 'reason')
         StateSubscription(node, DecisionMessage, 'decision', self._on_decision, owner='reasoner')
-        StateSubscription(node, DiagnosticArray, 'promises', self._on_promises, owner='reasoner')
+        StateSubscription(
+            node, DiagnosticArray, 'idleness_bounds', self._on_idleness_bounds, owner='reasoner'
+        )
 
     def _on_decision(self, message: DecisionMessage) -> None:
         with self._told:
             self._decision = conversions.decision_from(message)
             self._told.notify_all()
 
-    def _on_promises(self, message: DiagnosticArray) -> None:
-        self._promised, _ = conversions.promises_from(message)
+    def _on_idleness_bounds(self, message: DiagnosticArray) -> None:
+        self._idleness_bounds, _ = conversions.idleness_bounds_from(message)
 
     @property
-    def promised(self) -> tuple[Promise, ...]:
+    def idleness_bounds(self) -> tuple[IdlenessBound, ...]:
         """What the reasoner said last of what can be kept."""
-        return self._promised
+        return self._idleness_bounds
 
     @property
     def places(self) -> frozenset[str]:

@@ -5,7 +5,7 @@ for a day from when this process has it, by a clock that nobody sets. What one s
 as its text cannot be written in a mail, is put aside and told of; what it does not take now lets
 the next one pass. What waits outlives the process, a file that cannot be read is put aside; what
 was handed in before is not handed in again. What waits in the outbox of a run that has ended is
-taken over by the next one: an all-clear that was promised is told.
+taken over by the next one: an all-clear that is still due is sent.
 """
 
 from __future__ import annotations

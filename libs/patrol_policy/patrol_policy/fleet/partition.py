@@ -120,7 +120,7 @@ class Group:
 
 @dataclass(frozen=True)
 class FleetPlan:
-    """A partition of a map into groups. :attr:`wait` is the longest wait that it promises."""
+    """A partition of a map into groups. :attr:`wait` is the longest wait of a place."""
 
     groups: tuple[Group, ...]
 

@@ -35,14 +35,14 @@ export const names = (things) => Object.keys(things ?? {}).sort((a, b) => a.loca
 export const short = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
 
 // Seconds that a place may go unvisited: its own threshold, else the mission's; null: as long as it likes.
-export const limit = ({mission, promises}, name) => promises?.[name] ? promises[name].threshold : mission?.threshold;
+export const limit = ({mission, idleness_bounds}, name) => idleness_bounds?.[name] ? idleness_bounds[name].threshold : mission?.threshold;
 
 // How long a place waits: since its last visit, or since the mission is heard of; in words, and as a share of the threshold.
-export function wait({places, history, mission, promises}, name, now) {
+export function wait({places, history, mission, idleness_bounds}, name, now) {
   const {visited, urgent} = places[name];
   const begun = Math.min(now, ...[history?.visits[0], history?.battery[0]].filter(Boolean).map(([at]) => at));
   const seconds = Math.max(0, now - (visited ?? begun));
-  const threshold = limit({mission, promises}, name);
+  const threshold = limit({mission, idleness_bounds}, name);
   const late = urgent || Boolean(threshold) && seconds > threshold;
   return {seconds, late, share: late ? 1 : threshold ? seconds / threshold : 0, text: (visited === null ? 'never' : age(seconds)) + (late ? ' !' : '')};
 }

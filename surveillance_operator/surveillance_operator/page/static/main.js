@@ -2,7 +2,7 @@
 import {$, h, colour, figuresOf, shown, timeOfDay} from './dom.js';
 import {MapView} from './map.js';
 import {drawMachine, lightMachine} from './machine.js';
-import {drawStrips, showPromises} from './time.js';
+import {drawStrips, showIdlenessBounds} from './time.js';
 import {Why} from './why.js';
 import {showHealth} from './health.js';
 import {Control} from './control.js';
@@ -121,7 +121,7 @@ function present() {
 }
 
 const MOST_TRAIL = 600;
-const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'promises', 'robots', 'zones', 'stations', 'coverage'];
+const MAP_PARTS = ['status', 'grid', 'places', 'regions', 'links', 'doors', 'plan', 'scan', 'obstacles', 'pose', 'trail', 'mission', 'markers', 'others', 'idleness_bounds', 'robots', 'zones', 'stations', 'coverage'];
 const SHOW = {
   present: [['grid', 'places', 'machine', 'mission', 'health'], present],
   fleet: [['robots', 'doing', 'shares', 'out', 'troubles', 'brief', 'battery', 'decision', 'stopped', 'active', 'mission'], () => fleet.show()],
@@ -143,8 +143,8 @@ const SHOW = {
     $('release').hidden = !state.stopped;
   }],
   control: [['places', 'doors', 'mission', 'requests', 'health'], () => control.show()],
-  promises: [['promises', 'kept'], () => showPromises(state)],
-  strips: [['history', 'places', 'mission', 'promises'], () => drawStrips($('strips'), state, now())],
+  idleness_bounds: [['idleness_bounds', 'kept'], () => showIdlenessBounds(state)],
+  strips: [['history', 'places', 'mission', 'idleness_bounds'], () => drawStrips($('strips'), state, now())],
   map: [MAP_PARTS, (parts) => map.show(state, parts, now(), robots)],
 };
 

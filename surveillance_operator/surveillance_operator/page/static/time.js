@@ -72,16 +72,16 @@ export function drawStrips(root, state, now) {
 }
 
 // What can be kept of each place, those that cannot first.
-export function showPromises({promises, kept: words}) {
+export function showIdlenessBounds({idleness_bounds, kept: words}) {
   const order = ['never', 'later', 'unknown', 'closed', 'within'];
-  const found = names(promises).sort((a, b) => order.indexOf(promises[a].verdict) - order.indexOf(promises[b].verdict));
-  const kept = found.filter((name) => promises[name].verdict === 'within').length;
-  $('promises').hidden = !found.length;
+  const found = names(idleness_bounds).sort((a, b) => order.indexOf(idleness_bounds[a].verdict) - order.indexOf(idleness_bounds[b].verdict));
+  const kept = found.filter((name) => idleness_bounds[name].verdict === 'within').length;
+  $('idleness').hidden = !found.length;
   // Recordings of before have no words for all of them.
-  $('promises-line').textContent = words ?? `${kept} of ${found.length} places can be visited within their thresholds`;
-  $('promises-line').classList.toggle('warn', found.some((name) => promises[name].verdict === 'never'));
-  $('promises-list').replaceChildren(...found.map((name) => {
-    const {verdict, words, hours} = promises[name];
+  $('idleness-line').textContent = words ?? `${kept} of ${found.length} places can be visited within their thresholds`;
+  $('idleness-line').classList.toggle('warn', found.some((name) => idleness_bounds[name].verdict === 'never'));
+  $('idleness-list').replaceChildren(...found.map((name) => {
+    const {verdict, words, hours} = idleness_bounds[name];
     return h('li', {class: verdict === 'never' ? 'warn' : null}, words, hours ? h('small', {}, ` (${hours})`) : null);
   }));
 }

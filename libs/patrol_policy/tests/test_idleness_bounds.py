@@ -1,4 +1,4 @@
-"""What is promised in words, and decisions at their bounds."""
+"""Idleness bounds in words, and decisions at their bounds."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from patrol_policy.decision import (
 )
 from patrol_policy.graph import GraphError, PatrolGraph, graph_of_places
 from patrol_policy.hours import Openings
-from patrol_policy.promises import (
+from patrol_policy.idleness_bounds import (
     CLOSED,
     LATER,
     NEVER,
     UNKNOWN,
     WITHIN,
-    Promise,
+    IdlenessBound,
+    idleness_bounds,
     lines,
-    promises,
     summary,
     verdicts,
 )
@@ -47,22 +47,22 @@ from .test_plan import chain
 from .worlds import seven_rooms, world
 
 
-def promise(place: str, verdict: str, wait: float = 10.0, words: str = '') -> Promise:
-    return Promise(place, verdict, 100.0, wait, words or f'{place}: {verdict}')
+def bound(place: str, verdict: str, wait: float = 10.0, words: str = '') -> IdlenessBound:
+    return IdlenessBound(place, verdict, 100.0, wait, words or f'{place}: {verdict}')
 
 
 def test_the_first_line_is_for_all_and_what_is_alike_shares_one() -> None:
     assert lines([]) == ['there are no places to visit']
-    assert lines([promise('A', WITHIN), promise('B', WITHIN)]) == [
+    assert lines([bound('A', WITHIN), bound('B', WITHIN)]) == [
         'all 2 places can be visited within their thresholds'
     ]
     told = [
-        promise('A', WITHIN),
-        promise('B', LATER, 124.6),
-        promise('C', LATER, 110.0),
-        promise('D', LATER, 125.1, 'D: late'),
-        promise('E', NEVER, math.inf, 'E: never visited'),
-        promise('F', NEVER, math.inf, 'F: never visited'),
+        bound('A', WITHIN),
+        bound('B', LATER, 124.6),
+        bound('C', LATER, 110.0),
+        bound('D', LATER, 125.1, 'D: late'),
+        bound('E', NEVER, math.inf, 'E: never visited'),
+        bound('F', NEVER, math.inf, 'F: never visited'),
     ]
     assert lines(told) == [
         '3 of 6 places can be visited within their thresholds or little later (B, C up to 25 %)',
@@ -70,21 +70,21 @@ def test_the_first_line_is_for_all_and_what_is_alike_shares_one() -> None:
         'E, F: never visited',
     ]
     assert summary(told) == '; '.join(lines(told))
-    assert verdicts([*told, promise('G', UNKNOWN), promise('H', CLOSED)]) == {
+    assert verdicts([*told, bound('G', UNKNOWN), bound('H', CLOSED)]) == {
         'A': WITHIN, 'B': WITHIN, 'C': WITHIN, 'D': LATER, 'E': NEVER, 'F': NEVER, 'H': CLOSED,
     }  # fmt: skip
-    many = [promise(f'P{number}', NEVER, math.inf, f'P{number}: x') for number in range(10)]
+    many = [bound(f'P{number}', NEVER, math.inf, f'P{number}: x') for number in range(10)]
     assert lines(many[:8])[1] == 'P0, P1, P2, P3, P4, P5, P6, P7: x'
     assert lines(many[:9])[1] == 'P0, P1, P2, P3, P4, P5, P6, P7 and 1 more: x'
     assert lines(many)[0] == '0 of 10 places can be visited within their thresholds'
 
 
-def told_of(patrol: Patrol, place: str) -> Promise:
-    found = promises(patrol.world(), patrol.known_battery(), patrol.settings)
+def told_of(patrol: Patrol, place: str) -> IdlenessBound:
+    found = idleness_bounds(patrol.world(), patrol.known_battery(), patrol.settings)
     return next(each for each in found if each.place == place)
 
 
-def test_a_promise_says_by_how_much_a_place_is_late() -> None:
+def test_an_idleness_bound_says_by_how_much_a_place_is_late() -> None:
     graph = chain(3)
     # There and back takes 28 s; the ends are entered when they are URGENT only.
     for rules, threshold, verdict, words in (
@@ -125,14 +125,14 @@ def test_a_promise_says_by_how_much_a_place_is_late() -> None:
     )
 
 
-def test_a_promise_says_why_a_place_is_never_visited() -> None:
+def test_an_idleness_bound_says_why_a_place_is_never_visited() -> None:
     settings = DecisionSettings(policy='tour', recharge_rooms=('E',))
     seen = world(openings=Openings({'R1': 'it is a keep-out place'}, frozenset(), {}))
 
     def words(**changes: object) -> dict[str, str]:
         battery = changes.pop('battery', Battery())
         assert isinstance(battery, Battery)
-        found = promises(replace(seen, **changes), battery, settings, ('R9',))  # type: ignore[arg-type]
+        found = idleness_bounds(replace(seen, **changes), battery, settings, ('R9',))  # type: ignore[arg-type]
         return {each.place: each.words for each in found}
 
     told = words()
@@ -145,7 +145,7 @@ def test_a_promise_says_why_a_place_is_never_visited() -> None:
     )
     low = Battery(80.0, draw=Draw(0.1))
     far = replace(settings, recharge_rooms=('R9',))
-    found = promises(seen, low, far)
+    found = idleness_bounds(seen, low, far)
     assert 'never visited, no charging place can be reached' in found[-1].words
     # Nowhere would a second station help where the first one is all that the charge reaches.
     tight = Battery(80.0, draw=Draw(9.0), curves={'E': ChargeCurve.even(1.0)})

@@ -1,9 +1,11 @@
-"""What a patrol can keep, told beforehand: for each place how long it will wait, or why for ever.
+"""Upper bounds of idleness, told beforehand: how long each place will wait, or why for ever.
 
-`promises` is a pure function of what is known when a decision is made. It follows the plan of the
-policy `tour` from where the robot is until it repeats itself, so what it says is what comes, as
-long as legs, doors and battery stay as they are. In a fleet it counts all robots that have a share,
-their charging included: how long a place waits follows from its group's tour.
+Idleness is the time since the last visit of a place, as in the literature of patrolling.
+
+`idleness_bounds` is a pure function of what is known when a decision is made. It follows the plan
+of the policy `tour` from where the robot is until it repeats itself, so what it says is what comes,
+as long as legs, doors and battery stay as they are. In a fleet it counts all robots that have a
+share, their charging included: how long a place waits follows from its group's tour.
 """
 
 from __future__ import annotations
@@ -39,13 +41,13 @@ ROUNDING = 0.05
 
 
 @dataclass(frozen=True)
-class Promise:
+class IdlenessBound:
     """What can be kept of one place.
 
     Attributes:
         place: The place.
         verdict: ``within`` its threshold, ``later``, ``never``, ``unknown``, or ``closed``: it is
-            not promised before it opens.
+            no bound is told before it opens.
         threshold: Seconds that it may go unvisited; inf: as long as it likes.
         wait: The longest time from visit to visit, seconds; inf: it is not visited.
         words: The same as a sentence.
@@ -58,9 +60,9 @@ class Promise:
     words: str
 
 
-def promises(
+def idleness_bounds(
     world: Situation, battery: Battery, settings: DecisionSettings, places: Sequence[str] = ()
-) -> tuple[Promise, ...]:
+) -> tuple[IdlenessBound, ...]:
     """Return what can be kept of each place, by its name.
 
     The next decision follows the plan that this is read from.
@@ -97,19 +99,19 @@ def promises(
             words = f'{place}: not visited before {_end_of_stretch(place, world)}'
             if place in world.openings.closed:
                 words = f'{place}: not visited now, {world.openings.closed[place]}'
-            found.append(Promise(place, CLOSED, threshold, math.inf, words))
+            found.append(IdlenessBound(place, CLOSED, threshold, math.inf, words))
         elif never:
-            found.append(Promise(place, NEVER, threshold, math.inf, f'{place}: {never}'))
+            found.append(IdlenessBound(place, NEVER, threshold, math.inf, f'{place}: {never}'))
         elif math.isinf(wait) and proven and (world.fleet is None or place in waits):
             words = (
                 f'{place}: never visited, as the rules always have other places before it, and it '
                 'never becomes URGENT'
             )
-            found.append(Promise(place, NEVER, threshold, wait, words))
+            found.append(IdlenessBound(place, NEVER, threshold, wait, words))
         elif math.isinf(wait):
             why = cut or f'the policy {settings.policy} plans nothing ahead'
             words = f'{place}: it is not known when it is visited, {why}'
-            found.append(Promise(place, UNKNOWN, threshold, wait, words))
+            found.append(IdlenessBound(place, UNKNOWN, threshold, wait, words))
         else:
             found.append(_timely(place, wait, threshold, world, by))
     return tuple(found)
@@ -186,8 +188,8 @@ def _end_of_stretch(place: str, world: Situation) -> str:
     return f'it closes in {closes:.0f} s'
 
 
-def _timely(place: str, wait: float, threshold: float, world: Situation, by: str) -> Promise:
-    """Return the promise for a place that is visited again and again."""
+def _timely(place: str, wait: float, threshold: float, world: Situation, by: str) -> IdlenessBound:
+    """Return the bound of a place that is visited again and again."""
     hours = by + (' while it is open' if place in world.openings.windows else '')
     if world.openings.has_quiet:
         hours += ' outside the quiet hours'
@@ -195,12 +197,12 @@ def _timely(place: str, wait: float, threshold: float, world: Situation, by: str
         words = f'{place}: visited every {wait:.0f} s at the latest{hours}'
         if math.isfinite(threshold):
             words += f', within its threshold of {threshold:g} s'
-        return Promise(place, WITHIN, threshold, wait, words)
+        return IdlenessBound(place, WITHIN, threshold, wait, words)
     words = (
         f'{place}: visited every {wait:.0f} s at the latest{hours}, '
         f'{wait - threshold:.0f} s later than its threshold of {threshold:g} s'
     )
-    return Promise(place, LATER, threshold, wait, words)
+    return IdlenessBound(place, LATER, threshold, wait, words)
 
 
 def _why_never(
@@ -240,8 +242,8 @@ def _remedy(place: str, world: Situation, energy: Energy) -> str:
     return '; no second station within reach would do'
 
 
-def lines(found: Sequence[Promise]) -> list[str]:
-    """Return the promises in words: a sentence for all, then those that cannot be kept in full.
+def lines(found: Sequence[IdlenessBound]) -> list[str]:
+    """Return the bounds in words: a sentence for all, then those that cannot be kept in full.
 
     What is late by little is part of the first one: a place that the rules let the robot enter only
     when it is URGENT never is in time. Places of which the same is to be said share a line.
@@ -256,24 +258,24 @@ def lines(found: Sequence[Promise]) -> list[str]:
     if slightly:
         most = max(100.0 * (each.wait / each.threshold - 1.0) for each in slightly)
         first += f' or little later ({_named(slightly)} up to {most:.0f} %)'
-    alike: dict[str, list[Promise]] = {}
+    alike: dict[str, list[IdlenessBound]] = {}
     for each in rest:
         alike.setdefault(each.words.removeprefix(f'{each.place}: '), []).append(each)
     return [first, *(f'{_named(several)}: {words}' for words, several in alike.items())]
 
 
-def _named(found: Sequence[Promise]) -> str:
+def _named(found: Sequence[IdlenessBound]) -> str:
     names = [each.place for each in found]
     more = f' and {len(names) - MOST_NAMES} more' if len(names) > MOST_NAMES else ''
     return ', '.join(names[:MOST_NAMES]) + more
 
 
-def summary(found: Sequence[Promise]) -> str:
-    """Return the promises in one sentence for a log; see `lines`."""
+def summary(found: Sequence[IdlenessBound]) -> str:
+    """Return the bounds in one sentence for a log; see `lines`."""
     return '; '.join(lines(found))
 
 
-def verdicts(found: Sequence[Promise]) -> dict[str, str]:
+def verdicts(found: Sequence[IdlenessBound]) -> dict[str, str]:
     """Return what a person is told again of when it changes: kept, later or never, by place.
 
     What is late by so little that the next drive may turn it counts as kept; what is not known is
@@ -286,5 +288,5 @@ def verdicts(found: Sequence[Promise]) -> dict[str, str]:
     }
 
 
-def _slightly_later(promise: Promise) -> bool:
-    return promise.verdict == LATER and promise.wait <= SLIGHTLY * promise.threshold
+def _slightly_later(bound: IdlenessBound) -> bool:
+    return bound.verdict == LATER and bound.wait <= SLIGHTLY * bound.threshold
