@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 
 Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,6 +58,7 @@ MOST_MET = 0.15
 """A spot is free again when something was met there in this part of the sweeps that passed it, at
 most: the leg of a chair, which thin beams miss now and then, is met in more."""
 _WITH_CORNERS = np.ones((3, 3), np.bool_)
+_NEIGHBOURS = _WITH_CORNERS.view(np.uint8)
 
 
 class Change(StrEnum):
@@ -130,7 +132,7 @@ class FloorVisit:
         # Sweeps that met something near a cell, longer ago than `LEAVES`; and the later ones.
         self._met_near = np.zeros(shape, np.uint32)
         self._lately: deque[tuple[float, Mask]] = deque()
-        self._walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
+        self._walls = distance_to(grid.occupied, grid.resolution)
         self.sweeps = 0
 
     def add(
@@ -266,11 +268,10 @@ def changes(before: FloorView, now: FloorView) -> list[ObjectChange]:
         now: What was seen now.
     """
     grid = now.grid
-    reach = NEAR_THING / grid.resolution
-    stood = ndimage.distance_transform_edt(~before.occupied) <= reach
-    stands = ndimage.distance_transform_edt(~now.occupied) <= reach
+    stood = distance_to(before.occupied, grid.resolution) <= NEAR_THING
+    stands = distance_to(now.occupied, grid.resolution) <= NEAR_THING
     # It must have been seen free before: of what was never in view nobody knows.
-    known_free = ndimage.binary_dilation(before.free, _WITH_CORNERS)
+    known_free = _grown(before.free)
     new = _things(grid, now.occupied & ~stood, known_free)
     # Passed through itself: beside a thing that is seen from another side now the floor is free.
     gone = _things(grid, before.occupied & ~stands, now.free)
@@ -342,9 +343,14 @@ def _alike(one: _Thing, other: _Thing) -> bool:
     return longer <= SAME_SIZE * shorter + 0.1
 
 
+def _grown(cells: Mask) -> Mask:
+    """Return cells and their eight neighbours."""
+    return cv2.dilate(cells.view(np.uint8), _NEIGHBOURS).astype(np.bool_)
+
+
 def _things(grid: Grid, cells: Mask, decided: Mask) -> list[_Thing]:
     """Return clusters of cells, of which most were looked at in the other visit, too."""
-    joined = ndimage.binary_dilation(cells, _WITH_CORNERS, iterations=2)
+    joined = _grown(_grown(cells))
     labels, count = ndimage.label(joined, _WITH_CORNERS)
     labels[~cells] = 0
     found = []

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 from indoor_watch import floor_layers
 from indoor_watch.events import Event
 from indoor_watch.evidence import sweep_picture
@@ -139,7 +139,7 @@ class FloorMonitor:
         cells = self.grid.cells_of(np.concatenate(new))
         there[cells[:, 0], cells[:, 1]] = True
         # Of a thing its front alone is seen: what lies hidden just behind it is taken for it, too.
-        away = ndimage.distance_transform_edt(~there) * self.grid.resolution
+        away = distance_to(there, self.grid.resolution)
         there |= (away < BEHIND) & ~now.free
         return [
             Observation(
@@ -225,7 +225,7 @@ class FloorMonitor:
             cells = cells[now.grid.contains(cells)]
             things[cells[:, 0], cells[:, 1]] = True
         if things.any():
-            away = ndimage.distance_transform_edt(~things) * now.grid.resolution
+            away = distance_to(things, now.grid.resolution)
             new &= away > OTHER_SIDES
         self._untold |= now.occupied & new
         self.normal = replace(

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from floor_plans.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid, distance_to
 from indoor_watch.floor import FloorView
 from indoor_watch.visit import LidarSweep
 
@@ -191,9 +191,10 @@ def _drawn(centre: Array, grid: Grid, normal: FloorView | None) -> _Field:
     if normal is not None:
         stands |= normal.occupied[part]
     # From the middle of a cell to the surface of the nearest one of the other sort.
-    outside, inside = (ndimage.distance_transform_edt(each) for each in (~stands, stands))
-    distance = np.where(stands, 0.5 - inside, outside - 0.5) * grid.resolution
-    if not stands.any():
+    outside, inside = (distance_to(each, grid.resolution) for each in (stands, ~stands))
+    half = grid.resolution / 2
+    distance = np.where(stands, half - inside, outside - half).astype(float)
+    if stands.all() or not stands.any():
         distance = np.full(stands.shape, AROUND)
     slope = np.gradient(distance, grid.resolution) if min(stands.shape) > 1 else [distance * 0] * 2
     origin = np.asarray(grid.origin[:2]) + np.array([left, top]) * grid.resolution

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from floor_plans import Grid
+from floor_plans.occupancy_grid import distance_to
 from floor_plans.visibility import in_view
 
 Mask = NDArray[np.bool_]
@@ -55,7 +56,7 @@ class Viewpoints:
 
     def __init__(self, grid: Grid, radius: float) -> None:
         self._grid = grid
-        walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
+        walls = distance_to(grid.occupied, grid.resolution)
         self._standable = np.asarray(grid.free & (walls > radius + 0.1), np.bool_)
 
     def of_room(self, floor: Mask, first: Spot, checks: Sequence[Spot] = ()) -> list[Spot]:

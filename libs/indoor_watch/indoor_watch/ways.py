@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from floor_plans import Grid
-from floor_plans.occupancy_grid import drawn_lines
+from floor_plans.occupancy_grid import distance_to, drawn_lines
 from indoor_watch.doors import Segment
 
 Mask = NDArray[np.bool_]
@@ -52,6 +53,12 @@ class _Way:
     end: tuple[float, float]
     within: Mask
 
+    @cached_property
+    def box(self) -> tuple[slice, slice]:
+        """The rows and columns of what is within."""
+        rows, columns = np.nonzero(self.within)
+        return slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
+
 
 class Ways:
     """The ways of a map.
@@ -72,7 +79,7 @@ class Ways:
     ) -> None:
         self._grid = grid
         self._radius = radius
-        walls = ndimage.distance_transform_edt(~grid.occupied) * grid.resolution
+        walls = distance_to(grid.occupied, grid.resolution)
         self._passable = np.asarray(grid.free & (walls > radius), np.bool_)
         self._rooms, _ = ndimage.label(grid.free & ~drawn_lines(grid, list(doors.values())))
         rooms = self._rooms
@@ -88,11 +95,7 @@ class Ways:
                     xy = float(x), float(y)
                     if room and grid.at(rooms, *xy) == room:
                         ways.append(_Way(door, place, xy, side, np.asarray(rooms == room)))
-        self._ways = [
-            each
-            for each in ways
-            if self._is_free(self._passable, each.start, each.end, each.within)
-        ]
+        self._ways = [each for each in ways if self._is_free(self._passable, each)]
 
     def blocked(self, things: Mask) -> list[BlockedWay]:
         """Return the ways that things block.
@@ -102,12 +105,12 @@ class Ways:
         """
         if not things.any():
             return []
-        away = ndimage.distance_transform_edt(~things) * self._grid.resolution
+        away = distance_to(things, self._grid.resolution)
         passable = np.asarray(self._passable & (away > self._radius), np.bool_)
         rows, columns = np.nonzero(things)
         found = []
         for each in self._ways:
-            if self._is_free(passable, each.start, each.end, each.within):
+            if self._is_free(passable, each):
                 continue
             middle = (each.start[0] + each.end[0]) / 2, (each.start[1] + each.end[1]) / 2
             spots = [
@@ -120,14 +123,10 @@ class Ways:
                 found.append(BlockedWay(each.door, each.place, (float(at[0]), float(at[1]))))
         return found
 
-    def _is_free(
-        self, passable: Mask, start: tuple[float, float], end: tuple[float, float], within: Mask
-    ) -> bool:
-        rows, columns = np.nonzero(within)
-        box = slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
-        labels, _ = ndimage.label((passable & within)[box], _WITH_CORNERS)
-        corner = int(rows.min()), int(columns.min())
-        first, second = (self._labels_at(labels, corner, each) for each in (start, end))
+    def _is_free(self, passable: Mask, way: _Way) -> bool:
+        labels, _ = ndimage.label(passable[way.box] & way.within[way.box], _WITH_CORNERS)
+        corner = int(way.box[0].start), int(way.box[1].start)
+        first, second = (self._labels_at(labels, corner, each) for each in (way.start, way.end))
         return bool(first & second)
 
     def _labels_at(

@@ -88,10 +88,10 @@ class Renderer:
         nearness = np.zeros((height, width), np.float32)
         to_camera: Array = np.linalg.inv(camera_pose).astype(np.float64)
         # What is near is drawn first: most of what it hides is then never warped.
-        middles = np.array([face.middle for face in self._faces]) - camera_pose[:3, 3]
+        faces = self._facing(camera_pose)
+        middles = np.array([face.middle for face in faces]).reshape(-1, 3) - camera_pose[:3, 3]
         for index in np.argsort(np.linalg.norm(middles, axis=1)):
-            face = self._faces[index]
-            self._draw(face, to_camera, colours, nearness)
+            self._draw(faces[index], to_camera, colours, nearness)
         small = cv2.resize(
             colours,
             (self._camera.width, self._camera.height),
@@ -101,6 +101,18 @@ class Renderer:
         if self._lamps is None:
             return picture
         return self._lamps.shine(picture, nearness[::_FINER, ::_FINER], self._camera, camera_pose)
+
+    def _facing(self, camera_pose: Array) -> list[Face]:
+        """Return the faces that turn their front to a camera and lie ahead of it, as a whole."""
+        corners, across, down = (
+            np.array([getattr(face, side) for face in self._faces]).reshape(-1, 3)
+            for side in ('corner', 'across', 'down')
+        )
+        offsets = corners - camera_pose[:3, 3]
+        fronts = np.einsum('ni,ni->n', np.cross(down, across), offsets) < 0.0
+        depth, wide, high = (each @ camera_pose[:3, 2] for each in (offsets, across, down))
+        deepest = depth + np.maximum(wide, 0.0) + np.maximum(high, 0.0)
+        return [self._faces[index] for index in np.flatnonzero(fronts & (deepest > _NEAR))]
 
     def _draw(
         self, face: Face, to_camera: Array, colours: Picture, nearness: npt.NDArray[np.float32]
