@@ -81,6 +81,10 @@ class AssertionReader:
         self.spelling = {value: text for value, text in self.spelling.items() if value in used}
         self._most_values = max(LEAST_VALUES, 2 * len(self._values))
 
+    def keep_values(self) -> None:
+        """Take all values for asserted ones, as where nothing was ever retracted."""
+        self._most_values = max(self._most_values, 2 * len(self._values))
+
     def fact_of(self, axiom: Axiom) -> Fact | None:
         """Return the fact an assertion states, in representatives; None for assertions of another
         kind.

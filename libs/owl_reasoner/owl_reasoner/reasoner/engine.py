@@ -359,6 +359,7 @@ class Engine:
         self.renamed = True
         kept, gone = self.equality.join(merge)
         self.inequality.merge(kept, self.equality.members[kept])
+        self.inequality.denied.add(kept)
         moved = list(_facts_about(gone, filled))
         for fact in moved:
             for fire in fact[0].on_delete:
@@ -407,6 +408,7 @@ class Engine:
             self._take(fact)
         members = self.equality.split(representative)
         self.inequality.split(representative)
+        self.inequality.denied |= members
         for merge in self.conflicts.mentioning(members):
             self._overdeleted.append((self._nothing, representative))
             self._withdraw_conflict(merge)
@@ -471,7 +473,10 @@ class Engine:
         # It is worked off from its end: in the order of the assertions, then.
         self._queue.reverse()
         self._propagate()
-        self.reader.forget_values(self.asserted)
+        if removed:
+            self.reader.forget_values(self.asserted)
+        else:
+            self.reader.keep_values()
 
     def _replace(self, splitting: Iterable[str]) -> None:
         """Take away what went, and split classes of equal individuals, once new assertions hold."""
@@ -756,12 +761,16 @@ class Engine:
             self.program.unsupported.append(text)
 
     def _run_touched(self) -> None:
-        pending = self._related_by_difference(self._touched)
+        denied = self.inequality.denied
+        # A map states of all its places that they differ: nobody was denied that, and nobody asks
+        # again when 100,000 places come.
+        pending = self._related_by_difference(self._touched) if denied else {}
         self._touched.clear()
         for one in pending:
-            self.budget.tick()
-            for touch in self._network.touch_insert:
-                touch(one)
+            if one in denied:
+                self.budget.tick()
+                for touch in self._network.touch_insert:
+                    touch(one)
 
 
 def _looker(budget: Budget, origin: Axiom | None) -> Callable[[], None]:

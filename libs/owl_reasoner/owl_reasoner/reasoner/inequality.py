@@ -37,6 +37,8 @@ class Inequality:
     Attributes:
         evidence: By which facts two individuals differ.
         through: By which differences of others they do.
+        denied: Individuals of whom it was ever answered that one is not known to differ from some
+            other: whoever asked may have to ask again for these alone.
     """
 
     def __init__(self, program: Program) -> None:
@@ -49,6 +51,7 @@ class Inequality:
         self._apart = program.apart
         self.evidence: list[Evidence] = []
         self.through: list[EvidenceOfValues] = []
+        self.denied: set[str] = set()
 
     # --- stated differences ---
 
@@ -126,7 +129,11 @@ class Inequality:
         # The cheap sources first: sets, then rules, then what facts imply.
         if self._apart.succ and self._stated_by_rule(x, y):
             return True
-        return bool(self.evidence or self.through) and self._follows(x, y)
+        if (self.evidence or self.through) and self._follows(x, y):
+            return True
+        self.denied.add(x)
+        self.denied.add(y)
+        return False
 
     def _follows(self, x: str, y: str) -> bool:
         """Tell whether facts show the difference, of these two or of pairs that it comes down
