@@ -27,6 +27,7 @@ from owl_reasoner.reasoner.hypertableau.class_comparison import ClassComparison
 from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses, OfChain
 from owl_reasoner.reasoner.hypertableau.fact_questions import FactQuestions
 from owl_reasoner.reasoner.hypertableau.kept_model import KeptModel
+from owl_reasoner.reasoner.hypertableau.model_facts import kind_of
 
 _OTHER_MODELS = 3
 """Models beside the first one; most often one rules out what the first has by choice."""
@@ -278,9 +279,10 @@ class IncrementalCases:
         first, *others = self._models
         yield from (fact for fact in self.lasting if not known(fact))
         opened = dict.fromkeys(fact for fact in self._unrefuted if first.has(fact))
-        lasting = {name: first.lasting.get(name, {}) for name in first.names_touched()}
-        for name, before in lasting.items():
-            for fact, choices in first.about(name).items():
+        touched = first.touched()
+        for name in touched:
+            before = first.lasting.get(name, {})
+            for fact, choices in first.present(name).items():
                 if known(fact):
                     continue
                 if choices:
@@ -289,11 +291,12 @@ class IncrementalCases:
                 # yielded above.
                 elif before.get(fact, 1):
                     yield fact
+        # What others lacked and may have now.
         for other in others:
-            for name in other.names_touched():
-                if name not in lasting:
-                    facts = first.about(name).items()
-                    opened.update((fact, None) for fact, choices in facts if choices)
+            for name, kinds in other.touched().items():
+                kinds &= ~touched.get(name, 0)
+                facts = first.lasting.get(name, {}).items() if kinds else ()
+                opened.update((f, None) for f, choices in facts if choices and kind_of(f) & kinds)
         opened = dict.fromkeys(
             fact for fact in opened if all(other.has(fact) for other in others) and not known(fact)
         )

@@ -9,7 +9,7 @@ syntactic updates", ODBASE 2006, which keeps a completion graph and the axioms e
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,14 @@ from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.hypertableau.assertions import AssertionWriter, Prepared
 from owl_reasoner.reasoner.hypertableau.dl_clauses import DLClauses
 from owl_reasoner.reasoner.hypertableau.model import Choices
-from owl_reasoner.reasoner.hypertableau.model_facts import ModelFacts
+from owl_reasoner.reasoner.hypertableau.model_facts import (
+    CLASSES,
+    EVERY_KIND,
+    RELATIONS,
+    VALUES,
+    ModelFacts,
+    kind_of,
+)
 from owl_reasoner.reasoner.hypertableau.search import CaseSearch
 
 
@@ -51,9 +58,9 @@ class KeptModel:
         self.choices: set[Any] = set()
         self.is_flat = True
         self._derived = self._chosen = 0
-        # Whose each table of the model is.
-        self._owners: dict[int, int] = {}
-        self._touched: set[str] | None = None
+        # Whose each table of the model is, and of which kind of facts.
+        self._owners: dict[int, tuple[int, int]] = {}
+        self._touched: dict[str, int] | None = None
         self._present: dict[str, dict[Axiom, Choices]] = {}
 
     # --- the lasting assertions ---
@@ -76,7 +83,7 @@ class KeptModel:
         self.choices = search.chosen()
         search.hold()
         self._chosen, self.is_flat = search.mark(), False
-        self._touched, self._present = set(), {}
+        self._touched, self._present = {}, {}
         self.lasting = {name: {} for names in search.model.names.values() for name in names}
         for fact, choices in self.reader.all():
             self.lasting[subject_of(fact)][fact] = choices
@@ -87,12 +94,13 @@ class KeptModel:
         model = self.search.model
         owners = self._owners = {}
         for x in model.labels:
-            for table in (model.labels[x], model.out[x], model.values[x], model.groups_of(x)):
-                owners[id(table)] = x
-            for roles in model.out[x].values():
-                owners[id(roles)] = x
+            owners[id(model.labels[x])] = x, CLASSES
+            owners[id(model.values[x])] = x, VALUES
+            owners[id(model.groups_of(x))] = x, EVERY_KIND
+            for table in (model.out[x], *model.out[x].values()):
+                owners[id(table)] = x, RELATIONS
         for v, x in model.owner.items():
-            owners[id(model.props[v])] = owners[id(model.groups_of(v))] = x
+            owners[id(model.props[v])] = owners[id(model.groups_of(v))] = x, VALUES
 
     def take_back(self) -> None:
         """Go back to the lasting assertions and the choices of their model."""
@@ -133,59 +141,66 @@ class KeptModel:
 
         return self.search.attempt(state)
 
-    def _names_touched(self) -> set[str]:
-        """Return the named individuals of which anything changed above the kept choices."""
+    def _names_touched(self) -> dict[str, int]:
+        """Return the named individuals of which anything changed above the kept choices, each with
+        the kinds of its facts.
+        """
         model, owners = self.search.model, self._owners
-        by_individual = {
-            id(table) for table in (model.labels, model.out, model.values, model.names)
-        }
-        by_individual.add(id(model.gone))
+        whole = {id(t) for t in (model.labels, model.out, model.values, model.names, model.gone)}
         by_value = {id(model.sets), id(model.props), id(model.owner)}
-        touched: dict[int, None] = {}
+        touched: dict[int, int] = {}
         for table, key in model.changed_since(self._chosen):
             place = id(table)
-            x = owners.get(place)
-            if x is None and place in by_individual:
-                x = key
-            elif x is None and place in by_value:
-                x = model.owner.get(key)
-            if x is not None:
-                touched[x] = None
+            owner = owners.get(place)
+            if owner is not None:
+                x, kinds = owner
+            elif place in whole:
+                x, kinds = key, VALUES if key in model.owner else EVERY_KIND
+            elif place in by_value and key in model.owner:
+                x, kinds = model.owner[key], VALUES
+            else:
+                continue
+            touched[x] = touched.get(x, 0) | kinds
         if touched and self._rules.roles.complex_props():
             # Chains reach further than what they lead along.
-            return {name for names in model.names.values() for name in names}
-        found: set[str] = set()
-        for x in touched:
+            return self._all_touched()
+        found: dict[str, int] = {}
+        for x, kinds in touched.items():
             # A value that is gone stands for one of the same individual.
             present = model.find(model.owner.get(x, x))[0]
-            if present is not None and present in model.names:
-                found.update(model.names[present])
+            for name in () if present is None else model.names.get(present, ()):
+                found[name] = found.get(name, 0) | kinds
         return found
+
+    def _all_touched(self) -> dict[str, int]:
+        names = self.search.model.names.values()
+        return {name: EVERY_KIND for some in names for name in some}
 
     # --- facts ---
 
-    def names_touched(self) -> Iterable[str]:
-        """Return the named individuals that may have other facts than in `lasting`."""
-        if self._touched is not None:
-            return self._touched
-        model = self.search.model
-        return [name for x in model.alive() for name in model.names[x]]
+    def touched(self) -> Mapping[str, int]:
+        """Return the named individuals that may have other facts than in `lasting`, with the kinds
+        of these facts.
+        """
+        return self._all_touched() if self._touched is None else self._touched
 
-    def about(self, name: str) -> dict[Axiom, Choices]:
-        """Return the present facts whose subject is a named individual."""
-        if self._touched is not None and name not in self._touched:
-            return self.lasting.get(name, {})
+    def present(self, name: str) -> dict[Axiom, Choices]:
+        """Return the facts about a named individual that may be others than in `lasting`."""
         found = self._present.get(name)
         if found is None:
+            kinds = EVERY_KIND if self._touched is None else self._touched.get(name, 0)
             x, _ = self.search.model.individual(name)
-            facts = self.reader.about(x)
+            facts = self.reader.about(x, kinds)
             found = {fact: choices for fact, choices in facts if subject_of(fact) == name}
             self._present[name] = found
         return found
 
     def has(self, fact: Axiom) -> bool:
         """Tell whether a fact holds in the present model."""
-        return fact in self.about(subject_of(fact))
+        name = subject_of(fact)
+        if self._touched is None or self._touched.get(name, 0) & kind_of(fact):
+            return fact in self.present(name)
+        return fact in self.lasting.get(name, {})
 
 
 def subject_of(fact: Axiom) -> str:

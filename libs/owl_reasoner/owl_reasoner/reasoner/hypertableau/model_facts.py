@@ -16,8 +16,17 @@ from owl_reasoner.reasoner.hypertableau.search import CaseSearch
 
 _UNSURE = ~0
 """All choices: those of a fact that a model only hints at, so that it is asked for."""
+CLASSES, VALUES, RELATIONS, EVERY_KIND = 1, 2, 4, 7
+"""Kinds of facts about an individual, as bits; who is the same counts as a relation."""
 Held: TypeAlias = tuple[Axiom, Choices]
 """A fact, and the choices that it depends on."""
+
+
+def kind_of(fact: Axiom) -> int:
+    """Return of which kind a fact is."""
+    if isinstance(fact, ax.ClassAssertion):
+        return CLASSES
+    return VALUES if isinstance(fact, ax.DataPropertyAssertion) else RELATIONS
 
 
 class ModelFacts:
@@ -39,15 +48,19 @@ class ModelFacts:
         for x in [x for x in model.alive() if model.names[x]]:
             yield from self.about(x)
 
-    def about(self, x: int) -> Iterator[Held]:
-        """Yield the facts whose subject is one named individual, under each of its names."""
+    def about(self, x: int, kinds: int = EVERY_KIND) -> Iterator[Held]:
+        """Yield the facts, of some kinds, whose subject is one named individual, under each of its
+        names.
+        """
         model = self._search.model
         for name in model.names[x]:
             _, owner = model.individual(name)
-            for cls, choices in self._classes(x):
+            for cls, choices in self._classes(x) if kinds & CLASSES else ():
                 yield ax.ClassAssertion(cls, name), choices | owner
-            for prop, literal, choices in self._literals(x):
+            for prop, literal, choices in self._literals(x) if kinds & VALUES else ():
                 yield ax.DataPropertyAssertion(prop, name, literal), choices | owner
+            if not kinds & RELATIONS:
+                continue
             for other in model.names[x]:
                 if name < other:
                     pair = frozenset((name, other))

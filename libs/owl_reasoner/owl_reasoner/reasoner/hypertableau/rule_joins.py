@@ -56,6 +56,8 @@ MOST_TRIED = 300
 """Where so many values are possible, each of them is tried."""
 _LATER = 1000
 """The cost of a test, or a computation, some of whose terms another atom has to bind first."""
+_FEW = 4
+"""So many holders of a property are looked at before a join with its values."""
 _MOST_VALUES = 20_000
 """Of more possible values one can be chosen that is no other individual's."""
 _COMPARISONS = {
@@ -108,7 +110,9 @@ class CaseJoins:
                 # A plan for each atom that facts can make true: whichever comes last begins the
                 # join (semi-naive evaluation inside the search).
                 if isinstance(atom, FactAtom):
-                    self._index(_Plan(rule, atom, _ordered(rule.body, atom)))
+                    order = _ordered(rule.body, atom)
+                    props = tuple({one.prop for one in order if isinstance(one, OfProp)})
+                    self._index(_Plan(rule, atom, order, props))
 
     def _index(self, plan: _Plan) -> None:
         atom = plan.atom
@@ -172,7 +176,7 @@ class CaseJoins:
 
     def _apply(self, plan: _Plan, nodes: tuple[int, ...], choices: Choices) -> None:
         """Apply a rule wherever the atom that the plan begins with stands for certain nodes."""
-        if any(map(self._model.is_gone, nodes)):
+        if any(map(self._model.is_gone, nodes)) or not all(map(self._may_hold, plan.props)):
             return
         self._origin = plan.rule.origin
         self._model.budget.at_work = self._name_rule
@@ -183,6 +187,12 @@ class CaseJoins:
         for match in [match for first in found for match in self._joined(plan.order, 0, first)]:
             self._model.step()
             self._fire(plan.rule, match)
+
+    def _may_hold(self, prop: str) -> bool:
+        """Tell whether anybody may have a value by a property that is joined already."""
+        having, rejoin = self._model.having[prop], self._model.rejoin
+        # Where many have one it costs more to look than to join.
+        return len(having) > _FEW or any(x not in rejoin for x in having)
 
     def _joined(self, order: tuple[NamedAtom, ...], place: int, match: _Match) -> Iterator[_Match]:
         """Return the ways in which all atoms from a place on hold."""
@@ -224,6 +234,8 @@ class CaseJoins:
         """
         model = self._model
         labels, nominals = model.labels[x], model.rules.nominal_of
+        if not is_key and len(model.names[x]) == 1:
+            return labels[nominals[model.names[x][0]]]
         names = (name for name in model.names[x] if not (is_key and is_anonymous(name)))
         return min((labels[nominals[name]] for name in names), default=None)
 
@@ -483,11 +495,14 @@ class CaseJoins:
 
 
 class _Plan(NamedTuple):
-    """A rule, the atom that something new fits, and the other atoms in the order of their joins."""
+    """A rule, the atom that something new fits, and the other atoms in the order of their joins;
+    `props` are the data properties in these.
+    """
 
     rule: NamedRule
     atom: FactAtom
     order: tuple[NamedAtom, ...]
+    props: tuple[str, ...]
 
 
 def _ordered(body: Iterable[NamedAtom], given: FactAtom) -> tuple[NamedAtom, ...]:
