@@ -393,6 +393,7 @@ def _lint(argv: list[str]) -> int:
         ]
         for each in sorted((CHECKOUT / 'libs').iterdir())
     ]
+    examples = _readme_examples(CHECKOUT / '.mypy_cache' / 'readmes')
     code = 0
     for words in (
         ['ruff', 'check'],
@@ -400,11 +401,26 @@ def _lint(argv: list[str]) -> int:
         ['mypy'],
         [*tests, 'tests', 'benchmarks', 'examples', 'docs'],
         *([*tests, '--cache-dir', '.mypy_cache/libs', *folders] for folders in libraries),
+        [*tests, '--strict', '--cache-dir', '.mypy_cache/libs', *examples],
     ):
         print('+', *words, flush=True)
         done = subprocess.run([sys.executable, '-m', *words], cwd=CHECKOUT, check=False)
         code = code or done.returncode
     return code
+
+
+def _readme_examples(folder: Path) -> list[str]:
+    """Write the example of each library's README as a module; return their paths."""
+    import re
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for readme in sorted(CHECKOUT.glob('libs/*/README.md')):
+        blocks = re.findall(r'```python\n(.*?)```', readme.read_text(encoding='utf-8'), re.DOTALL)
+        path = folder / f'{readme.parent.name}_example.py'
+        path.write_text('\n'.join(blocks), encoding='utf-8')
+        written.append(str(path.relative_to(CHECKOUT)))
+    return written
 
 
 def _package_command(name: str, argv: list[str]) -> int:
