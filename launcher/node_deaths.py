@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from strict_files.files import FileError
@@ -40,24 +40,30 @@ class NodeDeaths:
     ) -> None:
         self._send, self._call, self._folder, self._now = send, call, folder, now
         self._incidents = Incidents(self._tell, LAUNCHER)
-        self._dying: dict[str, float] = {}
+        self._dying: dict[tuple[str, ...], float] = {}
 
-    def trouble(self, text: str) -> None:
-        """Take that a process dies again and again; the text begins with its name."""
-        name = text.split()[0]
-        self._dying[name] = self._now()
+    def trouble(self, nodes: Sequence[str], text: str) -> None:
+        """Take that a process dies again and again.
+
+        Args:
+            nodes: What it holds.
+            text: The line that says so.
+        """
+        name = ', '.join(nodes)
+        self._dying[tuple(nodes)] = self._now()
         action = f'read the last lines of {name} in the log of the run'
         self._incidents.begin(('node', name), text, action=action)
 
     def restarted(self, name: str, why: str) -> None:
-        """Take that a process was started again.
+        """Take that a node was started again.
 
         Args:
             name: As the log calls it.
-            why: What ended the one before.
+            why: What ended its process before.
         """
-        if name in self._dying:
-            self._dying[name] = self._now()
+        for nodes in self._dying:
+            if name in nodes:
+                self._dying[nodes] = self._now()
         self._write(name, why)
         # `alarm` itself may be new, and knows of none.
         for each in self._incidents.updates():
@@ -69,9 +75,10 @@ class NodeDeaths:
         Args:
             now: Steady time, seconds.
         """
-        for name, at in list(self._dying.items()):
+        for nodes, at in list(self._dying.items()):
             if now - at >= QUIET_AGAIN:
-                del self._dying[name]
+                del self._dying[nodes]
+                name = ', '.join(nodes)
                 self._incidents.end(('node', name), f'{name} lives')
 
     def _tell(self, told: IncidentUpdate) -> None:

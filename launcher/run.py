@@ -200,8 +200,15 @@ class Run:
         metavar='SECONDS',
         help='stop after this time (default: at Ctrl-C)',
     )
-    composed: bool = _switch(
-        '--composed', 'run all nodes in one process: less memory, faster start', _PROCESSES
+    processes: str = _option(
+        '--processes',
+        node_table.FEW,
+        group=_PROCESSES,
+        choices=node_table.COMPOSITIONS,
+        metavar='|'.join(node_table.COMPOSITIONS),
+        help='how the nodes share processes: few, so that what guards the base, what knows and '
+        'what records go on without the others; one-each; or one for all that work '
+        '(default: %(default)s)',
     )
     only: Sequence[str] = _nodes_option('--only', OPTIONS['only'].help)
     without: Sequence[str] = _nodes_option('--without', OPTIONS['without'].help)
@@ -412,6 +419,14 @@ def _add_options(parser: argparse._ActionsContainer, group: str) -> None:
     for each in fields(Run):
         if each.metadata['group'] == group:
             parser.add_argument(each.metadata['flag'], dest=each.name, **each.metadata['argument'])
+    if group == _PROCESSES:
+        parser.add_argument(
+            '--composed',
+            dest='processes',
+            action='store_const',
+            const=node_table.ONE,
+            help=f'the same as --processes {node_table.ONE}',
+        )
 
 
 def wanted_run(options: argparse.Namespace) -> Run:

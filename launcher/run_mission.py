@@ -29,7 +29,7 @@ from launcher.run_configuration import (
     with_mode_of,
     with_profile,
 )
-from launcher.run_processes import COMPOSED, node_environ, programs_of, ros_domain
+from launcher.run_processes import node_environ, programs_of, ros_domain
 from launcher.service import is_service
 from launcher.supervisor import EXIT_CUT, Supervisor
 from strict_files.files import FileError
@@ -115,12 +115,12 @@ def run_mission(
         copy_place(place, own / PLACE)
     if job is not None:
         programs = [
-            replace(each, leads=True, ends_run=True) if each.name == job.node else each
+            replace(each, leads=True, ends_run=True) if job.node in each.nodes else each
             for each in programs
         ]
-    alarm = next((each.name for each in programs if each.name == node_table.ALARM), None)
+    alarm = next((node_table.ALARM for each in programs if node_table.ALARM in each.nodes), None)
     names = [part.name(node.name) for part in team for node in part.everyone]
-    names += [part.name(COMPOSED) for part in team if run.composed]
+    names += [each.name for each in programs if each.name not in names]
     log = MergedLog(None, names, path=folder / LAUNCH_LOG)
     log.say(
         f'{job.title if job is not None else run.behaviour} in mode {mode}, '
@@ -271,8 +271,7 @@ def _supervised(
     if any(node.name == node_table.CONSOLE for part in team for node in part.nodes):
         from launcher.console import OperatorConsole
 
-        reader = COMPOSED if run.composed else node_table.CONSOLE
-        console = OperatorConsole(supervisor, log, reader)
+        console = OperatorConsole(supervisor, log, node_table.CONSOLE)
         console.start()
     try:
         code = supervisor.run(run.seconds)

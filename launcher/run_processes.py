@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from launcher.environment import interpreter
 from launcher.fleet_launch import RobotProcesses
 from launcher.log_merge import ROS_FORMAT
-from launcher.run import MARKERS, PAGE, RECORDER, Run
+from launcher.run import PAGE, Run
 from launcher.supervisor import ManagedProcess
 from surveillance_runtime import node_table
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
@@ -18,8 +17,8 @@ from surveillance_runtime.launch_protocol import ONE_THREAD
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
 
 NODE_PROCESS = Path(__file__).with_name('node_process.py')
-COMPOSED = 'composed'
-COMPOSED_SHARE = 3
+SHARE_OF_SEVERAL = 3
+"""So many times the memory of one node nodes of one process may hold together."""
 
 
 def ros_domain(run: Run) -> str:
@@ -98,48 +97,31 @@ def programs_of(
     renamed: Sequence[tuple[str, str]] = (),
 ) -> list[ManagedProcess]:
     """Return the processes of a part of a run, each with the nodes that share it."""
-    run, nodes, observers = part.run, part.nodes, part.observers
-
-    def program(members: Sequence[node_table.Node]) -> ManagedProcess:
-        arguments = ros_arguments([files[node.name] for node in members], run, renamed)
+    run = part.run
+    members: dict[str, list[node_table.Node]] = {}
+    for node in part.everyone:
+        # At the console, `exit NODE` ends one of these.
+        ends_alone = run.mode == 'MANUAL' and node.has_modes
+        name = node_table.process_of(node.name, run.processes, ends_alone=ends_alone)
+        members.setdefault(name, []).append(node)
+    programs = []
+    for process, nodes in members.items():
+        names = [node.name for node in nodes]
+        arguments = ros_arguments([files[name] for name in names], run, renamed)
         # It prints into the launcher's log; one of its own, as ROS writes it, grows without bound.
-        words = command(members, [*arguments, '--disable-external-lib-logs'], os.getpid())
-        memory = run.memory * 2**20
-        return ManagedProcess(part.name(members[0].name), words, environ, memory=memory)
-
-    programs: list[ManagedProcess] = []
-    if run.composed and nodes:
-        everything = program(nodes)
-        programs = [
-            replace(
-                everything,
-                name=part.name(COMPOSED),
-                takes_input=run.mode == 'MANUAL',
+        words = command(nodes, [*arguments, '--disable-external-lib-logs'], os.getpid())
+        programs.append(
+            ManagedProcess(
+                part.name(process if len(names) > 1 else names[0]),
+                words,
+                environ,
+                nodes=[part.name(name) for name in names],
+                # What the launcher tells of comes on the alarm's input.
+                takes_input=not {node_table.CONSOLE, node_table.ALARM}.isdisjoint(names),
+                leads=BEHAVIOUR_NODE in names and run.processes != node_table.ONE,
+                can_be_missed=names == [PAGE],
                 # Together they may hold what each may hold by itself, and share much.
-                memory=everything.memory * COMPOSED_SHARE,
+                memory=run.memory * 2**20 * min(len(names), SHARE_OF_SEVERAL),
             )
-        ]
-    elif nodes:
-        programs = [
-            replace(
-                program([node]),
-                takes_input=node.name == node_table.CONSOLE,
-                leads=node.name == BEHAVIOUR_NODE,
-            )
-            for node in nodes
-        ]
-    # What only records shares a process. Every other one has its own: strangers talk to the page,
-    # and pictures keep what compares them busy.
-    if members := [node for node in observers if node.name in (RECORDER, MARKERS)]:
-        programs.append(program(members))
-    programs += [
-        # What the launcher tells of comes on the alarm's input.
-        replace(
-            program([node]),
-            takes_input=node.name == node_table.ALARM,
-            can_be_missed=node.name == PAGE,
         )
-        for node in observers
-        if node.name not in (RECORDER, MARKERS)
-    ]
     return programs

@@ -67,6 +67,7 @@ class ManagedProcess:
     Attributes:
         name: in the log.
         command, environ: as for `subprocess`.
+        nodes: what it holds: the log names these when it starts and dies; default: its own name.
         takes_input: whether it reads lines, see `Supervisor.send`.
         leads: whether it uses the others, and so is stopped before them.
         ends_run: whether all others are stopped when it has ended, by itself or not: what it
@@ -78,11 +79,22 @@ class ManagedProcess:
     name: str
     command: Sequence[str]
     environ: Mapping[str, str]
+    nodes: Sequence[str] = ()
     takes_input: bool = False
     leads: bool = False
     ends_run: bool = False
     can_be_missed: bool = False
     memory: int = 0
+
+    @property
+    def names(self) -> Sequence[str]:
+        """What it holds."""
+        return self.nodes or (self.name,)
+
+    @property
+    def told(self) -> str:
+        """What it holds, in one line."""
+        return ', '.join(self.names)
 
 
 @dataclass
@@ -124,8 +136,8 @@ class Supervisor:
         pauses: seconds before a restart, see `restarts.PAUSES`.
         at_once: how many may come up at the same time; default: one more than there are
             processors, for each waits at times.
-        on_trouble: called with one line when a program dies again and again.
-        on_restart: called with the name of a program that is started again, and why.
+        on_trouble: called with the nodes and one line when a program dies again and again.
+        on_restart: called with the name of each node that is started again, and why.
         on_tick: called in each round, with steady time in seconds.
 
     Attributes:
@@ -138,12 +150,15 @@ class Supervisor:
         log: MergedLog,
         pauses: Sequence[float] = PAUSES,
         at_once: int | None = None,
-        on_trouble: Callable[[str], None] = lambda _text: None,
+        on_trouble: Callable[[Sequence[str], str], None] = lambda _nodes, _text: None,
         on_restart: Callable[[str, str], None] = lambda _name, _why: None,
         on_tick: Callable[[float], None] = lambda _now: None,
     ) -> None:
         self.children = {
             program.name: RunningProcess(program, Restarts(pauses)) for program in programs
+        }
+        self._holders = {
+            node: child for child in self.children.values() for node in child.program.names
         }
         self._to_start: list[RunningProcess] = []
         self._at_once = at_once or (os.cpu_count() or 1) + 1
@@ -190,8 +205,8 @@ class Supervisor:
         return take
 
     def send(self, name: str, line: str) -> bool:
-        """Write a line to a program's input; return whether somebody is there to read it."""
-        process = self.children[name].process
+        """Write a line to the input of the program that holds a node; return whether it lives."""
+        process = self._holders[name].process
         if process is None or process.stdin is None:
             return False
         try:
@@ -255,9 +270,10 @@ class Supervisor:
         child.read = self.read_from(
             process.stdout.fileno(), partial(self._log.line, child.program.name)
         )
-        self._log.say(f'started {child.program.name} (process {process.pid})')
-        if child.starts > 1:
-            self._on_restart(child.program.name, child.died_of)
+        for name in child.program.names:
+            self._log.say(f'started {name} (process {process.pid})')
+            if child.starts > 1:
+                self._on_restart(name, child.died_of)
 
     @contextlib.contextmanager
     def _pipe(self, on_read: Callable[[bytes], None]) -> Iterator[int]:
@@ -340,7 +356,7 @@ class Supervisor:
                     stream.close()
 
     def _after_death(self, child: RunningProcess, code: int) -> None:
-        name = child.program.name
+        name = child.program.told
         if self._stopping_since is not None:
             if code not in (0, -signal.SIGTERM) and not child.killed:
                 self._log.warn(f'{name} ended with {describe_exit(code)}')
@@ -367,11 +383,12 @@ class Supervisor:
         pause = child.restarts.died(now, now - child.started, worked=worked)
         child.restart_at = now + pause
         when = f' in {pause:g} s' if pause else ''
-        self._log.warn(f'{name} died ({why}): starting it again{when}')
+        for each in child.program.names:
+            self._log.warn(f'{each} died ({why}): starting it again{when}')
         if trouble := child.restarts.trouble(now):
             text = f'{name} {trouble}, last: {why}'
             self._log.error(f'{text}: a person should look at it')
-            self._on_trouble(text)
+            self._on_trouble(child.program.names, text)
 
     def _watch(self, now: float) -> None:
         """End what hangs or holds too much memory; it is started again as after a death."""
@@ -408,7 +425,7 @@ class Supervisor:
         """End a process, to be started again as after a death."""
         if child.process is not None and not child.ended_for and self._stopping_since is None:
             child.ended_for = problem
-            self._log.warn(f'{child.program.name} {problem}: ending it')
+            self._log.warn(f'{child.program.told} {problem}: ending it')
             self._kill(child, can_tell=can_tell)
 
     def _kill(self, child: RunningProcess, *, can_tell: bool) -> None:
@@ -448,9 +465,9 @@ class Supervisor:
                 continue
             child.killed = True
             if child.done:
-                self._log.say(f'{child.program.name} has done its work, ROS does not let it end')
+                self._log.say(f'{child.program.told} has done its work, ROS does not let it end')
             else:
-                self._log.warn(f'{child.program.name} did not end in time: killed')
+                self._log.warn(f'{child.program.told} did not end in time: killed')
             self._kill(child, can_tell=not (self._stop_at_once or child.done))
 
     def _keep_time(self, end: float | None) -> None:

@@ -15,6 +15,9 @@ DEFAULT_BEHAVIOUR = BEHAVIOURS[0]
 LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 CONSOLE = 'console'
 RECORDER, MARKERS, ALARM = 'mission_recorder', 'mission_markers', 'alarm'
+FEW, ONE_EACH, ONE = 'few', 'one-each', 'one'
+COMPOSITIONS = (FEW, ONE_EACH, ONE)
+"""How a run's nodes are put into processes: by failure domain, each into its own, all into one."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,43 @@ _MONITOR = 'collision_monitor'
 EXPLORER = 'explorer'
 RUN_NODES = frozenset((*_ALWAYS, *_OF_PATROL, *_OF_BASE, EXPLORER))
 """The nodes of which a robot has one each."""
+
+
+KNOWLEDGE, PATROL, RECORDS, TOGETHER = 'knowledge', 'patrol', 'records', 'composed'
+_DOMAINS = {
+    KNOWLEDGE: ('armor_server', 'ontology_map_builder'),
+    PATROL: (
+        *('robot_behavior', 'reasoner', 'initial_state'),
+        *('battery_controller', 'planner_controller', 'motion_controller'),
+        *('arm_controller', 'marker_server'),
+    ),
+    RECORDS: (ALARM, RECORDER, MARKERS),
+}
+_DOMAIN_OF = {node: name for name, nodes in _DOMAINS.items() for node in nodes}
+PROCESSES = (*_DOMAINS, TOGETHER)
+"""The names of processes that hold several nodes."""
+
+
+def process_of(node: str, composition: str = FEW, *, ends_alone: bool = False) -> str:
+    """Return the name of the process that a node of a run belongs to: a node's, or of `PROCESSES`.
+
+    By failure domain, what has to go on without the others is apart: what guards the base, what
+    knows, what tells and records. So is what strangers talk to (the page), and what computes long
+    (pictures, the simulated place).
+
+    Args:
+        node: Its name.
+        composition: One of `COMPOSITIONS`.
+        ends_alone: Whether an operator may end this node and not the others.
+    """
+    if node in (RECORDER, MARKERS):
+        return RECORDS
+    if composition == ONE_EACH or (ends_alone and composition == FEW):
+        return node
+    domain = _DOMAIN_OF.get(node, node)
+    looks_on = domain == RECORDS or BY_NAME[node].package == 'surveillance_operator'
+    alone = (looks_on and node != CONSOLE) or node == 'observer'
+    return TOGETHER if composition == ONE and not alone else domain
 
 
 SHARED = frozenset(

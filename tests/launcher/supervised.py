@@ -21,6 +21,7 @@ for argument in sys.argv[1:]:
             name,
             command,
             os.environ,
+            nodes=name.split('+') if '+' in name else (),
             takes_input=True,
             leads=name.startswith('lead'),
             ends_run=name.startswith('job'),
@@ -34,7 +35,7 @@ supervisor = Supervisor(
     log,
     pauses=(0.01, 0.02),
     at_once=at_once or None,
-    on_trouble=lambda text: print('alarm:', text, flush=True),
+    on_trouble=lambda _nodes, text: print('alarm:', text, flush=True),
 )
 supervisor.read_from(
     0, lambda line: print('sent', supervisor.send(*line.split(' ', 1)), flush=True)

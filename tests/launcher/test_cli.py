@@ -87,7 +87,7 @@ def test_the_options_of_a_run():
     assert options.mode == 'MANUAL'
     assert options.seconds == 2.5
     assert options.without == ['armor_server', 'reasoner']
-    assert options.composed
+    assert options.processes == 'one'
 
 
 def test_a_middleware_that_is_not_installed_is_said_in_one_line_and_does_without():

@@ -31,7 +31,7 @@ class Input:
 def test_a_node_that_dies_again_and_again_is_an_incident_until_it_lives() -> None:
     alarm, calls, now = Input(), [], 0.0
     deaths = NodeDeaths(alarm.send, calls.append, now=lambda: now)
-    deaths.trouble(TROUBLE)
+    deaths.trouble(['motion_controller', 'planner_controller'], TROUBLE)
     now = 100.0
     deaths.restarted('planner_controller', 'exit code 1')
     deaths.advance(QUIET_AGAIN)
@@ -51,7 +51,7 @@ def test_a_person_is_called_where_the_alarm_itself_does_not_live() -> None:
     alarm, calls = Input(), []
     deaths = NodeDeaths(alarm.send, calls.append)
     alarm.lives = False
-    deaths.trouble(TROUBLE)
+    deaths.trouble(['planner_controller'], TROUBLE)
     assert calls == [TROUBLE]
     alarm.lives = True
     deaths.restarted('alarm', 'killed by SIGKILL')

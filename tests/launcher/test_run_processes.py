@@ -17,12 +17,13 @@ from launcher.run import (
 from launcher.run_configuration import configuration
 from launcher.run_processes import command, node_environ, programs_of, ros_arguments
 from surveillance_runtime import discovery
+from surveillance_runtime.node_table import COMPOSITIONS
 from tests.launcher.runs import settings_of
 
 
-@pytest.mark.parametrize('composed', [False, True])
-def test_a_console_node_reads_for_all_controllers(composed, tmp_path):
-    run = Run(mode='MANUAL', composed=composed)
+@pytest.mark.parametrize('processes', COMPOSITIONS)
+def test_a_console_node_reads_for_all_controllers(processes, tmp_path):
+    run = Run(mode='MANUAL', processes=processes)
     assert run.nodes()[0].name == 'console'
     merged = configuration(CONFIG, run, tmp_path)
     resolved = merged.resolve('planner_controller', '/planner_controller')
@@ -91,14 +92,46 @@ def test_a_domain_reaches_the_nodes(tmp_path):
     assert node_environ(Run()).get('ROS_DOMAIN_ID') == os.environ.get('ROS_DOMAIN_ID')
 
 
-@pytest.mark.parametrize('composed', [False, True])
-def test_everything_that_only_looks_on_gets_a_process(tmp_path, composed):
-    watch = tmp_path / 'watch.yaml'
-    run = Run(web=True, watch=watch, record=str(tmp_path), composed=composed)
-    nodes, observers = run.nodes(), run.observers()
-    part = RobotProcesses(run=run, nodes=nodes, observers=observers)
-    files = {node.name: tmp_path / node.name for node in part.everyone}
-    started = ' '.join(word for each in programs_of(part, files, {}) for word in each.command)
-    assert {'observer', 'mission_page', 'mission_recorder'} <= {node.name for node in observers}
-    for node in observers:
+def processes_of(run):
+    """Return the nodes of each process of a run, and the processes."""
+    part = RobotProcesses(run=run, nodes=run.nodes(), observers=run.observers())
+    files = {node.name: Path(node.name) for node in part.everyone}
+    programs = programs_of(part, files, {})
+    started = ' '.join(word for each in programs for word in each.command)
+    for node in part.everyone:
         assert started.count(f'{node.name}={node.module}:{node.class_name}') == 1, node.name
+    return [set(each.names) for each in programs], programs
+
+
+def test_what_must_go_on_without_the_others_is_apart(tmp_path):
+    found, programs = processes_of(Run(web=True, watch=tmp_path / 'w', record=str(tmp_path)))
+    assert {'collision_monitor'} in found
+    assert {'armor_server', 'ontology_map_builder'} in found
+    assert {'mission_page'} in found
+    assert {'observer'} in found
+    assert {'simulator'} in found
+    assert {'alarm', 'mission_recorder', 'mission_markers'} in found
+    assert len(found) == 7
+    (leader,) = (each for each in programs if each.leads)
+    assert 'robot_behavior' in leader.names
+    (listens,) = (each for each in programs if each.takes_input)
+    assert 'alarm' in listens.names
+
+
+def test_each_node_gets_its_own_process_where_that_is_asked_for(tmp_path):
+    found, _ = processes_of(Run(record=str(tmp_path), processes='one-each'))
+    assert {'mission_recorder', 'mission_markers'} in found
+    assert sum(len(each) > 1 for each in found) == 1
+
+
+def test_everything_that_works_gets_one_process_where_that_is_asked_for(tmp_path):
+    found, _ = processes_of(Run(web=True, record=str(tmp_path), processes='one'))
+    assert {node.name for node in Run().nodes()} in found
+    assert {'mission_page'} in found
+    assert len(found) == 3
+
+
+def test_what_the_console_may_end_by_itself_is_apart():
+    found, _ = processes_of(Run(mode='MANUAL'))
+    for name in ('battery_controller', 'planner_controller', 'motion_controller', 'console'):
+        assert {name} in found

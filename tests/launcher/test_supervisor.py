@@ -204,6 +204,23 @@ def test_a_child_that_dies_comes_back_and_the_rest_goes_on(start):
     assert sum('started two' in line for line in launch.lines) == 1
 
 
+def test_each_node_of_a_process_is_named_and_lines_reach_the_process_that_holds_theirs(start):
+    echo = 'print("got", input(), flush=True)\n'
+    launch = start(DRIVER, f'one+two={WAIT}', f'three+four={echo}{WAIT}')
+    first, second = (
+        int(launch.until(rf'started {name} \(process (\d+)\)')[1]) for name in ('one', 'two')
+    )
+    assert first == second
+    launch.write('four hello')
+    launch.until('got hello')
+    launch.until(r'one\+two +\| up')
+    os.kill(first, signal.SIGKILL)
+    for name in ('one', 'two'):
+        launch.until(rf'{name} died \(killed by SIGKILL\): starting it again')
+    launch.until(r'one\+two +\| up', after=len(launch.lines))
+    assert launch.end(signal.SIGINT)[0] == 0
+
+
 def test_pauses_grow_while_a_child_keeps_dying(start):
     launch = start(DRIVER, 'one=import sys; sys.exit(3)')
     launch.until(r'died \(exit code 3\): starting it again in 0.01 s')
