@@ -513,14 +513,18 @@ class Canvas:
         wide, high = self._image.size
         north = values[::-1]  # row 0 of a picture is in the north
         top = bottom - len(north) * side
+        # Each fine pixel is what the cell is that its middle lies in; all others are off the map.
+        column = np.floor((np.arange(wide) + 0.5 - left) / side).astype(np.intp)
+        row = np.floor((np.arange(high) + 0.5 - top) / side).astype(np.intp)
+        across = np.flatnonzero((column >= 0) & (column < north.shape[1]))
+        down = np.flatnonzero((row >= 0) & (row < north.shape[0]))
+        if not across.size or not down.size:
+            return
+        shown = north[row[down][:, None], column[across]]
         palette = np.array([(0, 0, 0), *map(ImageColor.getrgb, colours)], np.uint8)
-        # Each fine pixel is what the cell is that its middle lies in.
-        to_cells = (1 / side, 0.0, -left / side, 0.0, 1 / side, -top / side)
-        paint, mask = (
-            Image.fromarray(each).transform((wide, high), Image.Transform.AFFINE, to_cells)
-            for each in (palette[north], (north > 0).astype(np.uint8) * np.uint8(255))
-        )
-        self._image.paste(paint, mask=mask)
+        corner = (int(across[0]), int(down[0]))
+        mask = Image.fromarray((shown > 0).astype(np.uint8) * np.uint8(255))
+        self._image.paste(Image.fromarray(palette[shown]), corner, mask)
 
     def arc(
         self,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.map_rooms.segmentation import CELL, Segmentation
-from floor_plans.occupancy_grid import Grid
+from floor_plans.occupancy_grid import Grid, boxes, totals
 from floor_plans.visibility import in_view
 
 Labels = NDArray[np.int32]
@@ -48,13 +48,11 @@ class Hall:
     Attributes:
         area: Square metres.
         seen: Which part of its floor is seen from its point.
-        parts: The aisles and cross aisles of the working map's cells, from 1; 0 elsewhere.
-        aisles: How many of these are aisles.
+        aisles: How many aisles shelves leave in it.
     """
 
     area: float
     seen: float
-    parts: Labels
     aisles: int
 
 
@@ -71,26 +69,27 @@ def halls(
         points: Of the rooms, on the working map: x and y in metres from its corner.
     """
     labels, grid = found.working_labels, found.working
-    areas = np.bincount(labels.ravel(), minlength=found.rooms + 1) * CELL**2
-    plain = Grid(grid.cells, CELL)
+    areas = totals(labels, found.rooms + 1) * CELL**2
     result = {}
-    for number, name in names.items():
-        if areas[number] < HALL:
+    for number, box in boxes(labels).items():
+        if number not in names or areas[number] < HALL:
             continue
-        room = labels == number
-        view = in_view(plain, points[name], REACH) & room
-        seen = float(view.sum() / max(1, int((room & grid.free).sum())))
+        # The room alone: a building has many, and is much larger.
+        name, room = names[number], labels[box] == number
+        own = Grid(grid.cells[box], CELL, (box[1].start * CELL, box[0].start * CELL))
+        view = in_view(own, points[name], REACH) & room
+        seen = float(view.sum() / max(1, int((room & own.free).sum())))
         if seen >= SEEN:
             continue
-        parts, aisles = aisles_of(room, grid.free)
+        aisles = aisles_of(room, own.free)[1]
         if aisles or number not in found.corridors or len(names) == 1:
-            result[name] = Hall(round(float(areas[number]), 1), round(seen, 2), parts, aisles)
+            result[name] = Hall(round(float(areas[number]), 1), round(seen, 2), aisles)
     return result
 
 
 def with_aisles(found: Segmentation) -> Segmentation:
     """Return the rooms of a map with each hall that has aisles cut into these."""
-    areas = np.bincount(found.working_labels.ravel(), minlength=found.rooms + 1) * CELL**2
+    areas = totals(found.working_labels, found.rooms + 1) * CELL**2
     for number in range(1, found.rooms + 1):
         if areas[number] < HALL:
             continue

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from floor_plans.occupancy_grid import totals
+
 SEPARATE = 0.9
 """Area of the smaller part, in squares of the opening's width, from which on two are rooms."""
 _SMALL = 1.0
@@ -53,8 +55,8 @@ def joined(
     """
     count = int(parts.max()) + 1
     cell = resolution**2
-    area = np.bincount(parts.ravel(), minlength=count) * cell
-    depth = np.bincount(parts.ravel(), weights=clearance.ravel(), minlength=count) * cell
+    area = totals(parts, count) * cell
+    depth = totals(parts, count, clearance) * cell
     room = _Joining(area.tolist(), depth.tolist(), _borders(parts, cuts, clearance, resolution))
     return room.join()
 

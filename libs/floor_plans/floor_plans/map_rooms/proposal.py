@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, pairwise
 from typing import Any
 
 import cv2
@@ -29,7 +29,7 @@ from floor_plans.map_rooms.segmentation import (
     segment,
     spread,
 )
-from floor_plans.occupancy_grid import Grid, distance_to, walled_off
+from floor_plans.occupancy_grid import Grid, boxes, distance_to, totals, walled_off
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.room_map import RoomMap, check_passable
 from floor_plans.rooms import PlaceError
@@ -105,7 +105,7 @@ class Proposal:
     def areas(self) -> dict[str, float]:
         """Return the area of each room, square metres."""
         grid = self.segmentation.working
-        counts = np.bincount(self.segmentation.working_labels.ravel(), minlength=1)
+        counts = totals(self.segmentation.working_labels, self.segmentation.rooms + 1)
         return {name: float(counts[n]) * grid.resolution**2 for n, name in self.names.items()}
 
     def confidence(self) -> dict[str, float]:
@@ -193,13 +193,14 @@ def propose(
     floor = _Floor(building, radius, known, scale, free, clearance, with_outside)
     found = _without_false_doors(floor, found)
     found = with_aisles(found) if aisles else found
+    borders = _borders(found.working_labels, free)
     for _ in range(found.rooms):
-        layout = _laid_out(floor, found)
+        layout = _laid_out(floor, found, borders)
         pair = layout.one_room or _not_parted(floor, layout)
         if pair is None:
             return layout.proposal
         found = found.joined(*pair)
-    return _laid_out(floor, found).proposal
+    return _laid_out(floor, found, borders).proposal
 
 
 @dataclass(frozen=True)
@@ -244,7 +245,7 @@ class _Layout:
     one_room: tuple[int, int] | None = None
 
 
-def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
+def _laid_out(floor: _Floor, found: Segmentation, borders: NDArray[np.intp]) -> _Layout:
     """Return the place of rooms as they were found.
 
     Raises:
@@ -258,13 +259,13 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     inner = np.where(np.isin(labels, list(outside)), 0, labels) if outside else labels
     reach = _reachable(inner, clearance, radius)
     needed = radius + 1.5 * found.working.resolution
-    openings = _openings(labels, floor.free, clearance, needed + _SPARE)
+    openings = _openings(labels, borders, clearance, needed + _SPARE)
     ways = [
         each
         for each in openings
         if each.clearance > needed and _fits(reach, each) and outside.isdisjoint(each.rooms)
     ]
-    rooms = _joined_rooms({number for number in np.unique(labels[reach]).tolist() if number}, ways)
+    rooms = _joined_rooms(set(_numbers(labels, reach)), ways)
     if not rooms:
         raise ValueError(f'a robot with a radius of {radius:g} m fits nowhere: expected free floor')
     ways = [each for each in ways if set(each.rooms) <= rooms]
@@ -298,9 +299,9 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
     near = _beside(floor, [*lines, *walls])
     positions: dict[str, list[float]] = {}
     one_room = None
-    boxes = _boxes(labels)
+    parts = boxes(labels)
     for number in sorted(rooms):
-        box = boxes[number]  # a building has hundreds of rooms: each is looked at alone
+        box = parts[number]  # a building has hundreds of rooms: each is looked at alone
         mask = labels[box] == number
         inside = mask & ~near[box]
         if len(rooms) > 1 and not (inside & reach[box]).any():
@@ -312,7 +313,7 @@ def _laid_out(floor: _Floor, found: Segmentation) -> _Layout:
         at = (column + box[1].start, row + box[0].start)
         positions[names[number]] = _rounded(floor.world([at])[0])
     points = list(positions.values())
-    beyond = [_widest(labels, number, boxes[number], clearance) for number in outside]
+    beyond = [_widest(labels, number, parts[number], clearance) for number in outside]
     points += [floor.world([at])[0] for at in beyond]
     walls += _gaps(floor, found, [*lines, *walls], points)
     station, home = _station(floor.building, labels, reach & ~near, rooms, names, positions, scale)
@@ -365,12 +366,10 @@ def outside_of(found: Segmentation) -> frozenset[int]:
     return outer if set(range(1, found.rooms + 1)) - outer else frozenset()
 
 
-def _boxes(labels: Labels) -> dict[int, tuple[slice, slice]]:
-    """Return the rows and columns that each number's cells lie in."""
-    from scipy import ndimage  # takes 0.2 s: most only show a place
-
-    found = ndimage.find_objects(labels)
-    return {number: (box[0], box[1]) for number, box in enumerate(found, start=1) if box}
+def _numbers(labels: Labels, where: Mask) -> list[int]:
+    """Return the rooms of the cells of a mask."""
+    found = totals(labels, int(labels.max()) + 1, where)
+    return [number for number in np.flatnonzero(found).tolist() if number]
 
 
 def _widest(
@@ -394,19 +393,19 @@ def _left_out(
     The widths are those of openings: a robot of a radius needs twice that and some centimetres.
     """
     labels, clearance, cell = found.working_labels, floor.clearance, floor.scale**2
-    areas = np.bincount(labels.ravel(), minlength=found.rooms + 1) * cell
+    areas = totals(labels, found.rooms + 1) * cell
     needed = floor.radius + 1.5 * found.working.resolution
 
-    boxes = _boxes(labels)
+    parts = boxes(labels)
 
     def part(number: int, reason: str) -> LeftOut:
-        x, y = _rounded(floor.world([_widest(labels, number, boxes[number], clearance)])[0])
+        x, y = _rounded(floor.world([_widest(labels, number, parts[number], clearance)])[0])
         return LeftOut(number, reason, round(float(areas[number]), 2), (x, y))
 
     others = sorted(set(range(1, found.rooms + 1)) - rooms - outside)
 
     def why(number: int) -> str:
-        box = boxes[number]
+        box = parts[number]
         if float(clearance[box][labels[box] == number].max()) <= floor.radius:
             return f'too narrow for a robot {2 * floor.radius:g} m wide'
         # Rooms that lead into each other have their way in together.
@@ -452,11 +451,13 @@ def _without_false_doors(floor: _Floor, found: Segmentation) -> Segmentation:
     (`_LIFT`) is no room in either case. Closets and lifts behind doors in walls stay.
     """
     cell, grid = floor.scale**2, found.working
+    borders = _borders(found.working_labels, floor.free)
     for _ in range(_PASSES):
-        areas = np.bincount(found.working_labels.ravel(), minlength=found.rooms + 1) * cell
+        areas = totals(found.working_labels, found.rooms + 1) * cell
         needed = floor.radius + 1.5 * grid.resolution
         widest: dict[int, tuple[float, tuple[int, int]]] = {}
-        for each in _openings(found.working_labels, floor.free, floor.clearance, needed + _SPARE):
+        enough = needed + _SPARE
+        for each in _openings(found.working_labels, borders, floor.clearance, enough):
             if each.clearance <= needed:
                 continue
             ends = (np.array([each.start, each.end, each.middle]) + 0.5) * floor.scale
@@ -604,40 +605,52 @@ def _reachable(labels: Labels, clearance: NDArray[np.float32], radius: float) ->
     return np.asarray(pieces == largest)
 
 
+def _borders(labels: Labels, free: Mask) -> NDArray[np.intp]:
+    """Return the pairs of free cells at which two rooms meet: indices into the flat map, (2, n).
+
+    Joining rooms takes some of them away and adds none, so that they are looked for once.
+    """
+    index = np.arange(labels.size, dtype=np.int32).reshape(labels.shape)
+    found = []
+    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        meet = labels[here] != labels[there]
+        meet &= free[here] & free[there]
+        found.append(np.stack([index[here][meet], index[there][meet]]))
+    pairs = np.concatenate(found, axis=1)
+    return pairs[:, (labels.ravel()[pairs] > 0).all(axis=0)].astype(np.intp)
+
+
 def _openings(
-    labels: Labels, free: Mask, clearance: NDArray[np.float32], enough: float
+    labels: Labels, borders: NDArray[np.intp], clearance: NDArray[np.float32], enough: float
 ) -> list[_Opening]:
     """Return the pieces of free borders between rooms, in the order of the rooms.
 
     Args:
         labels: The rooms.
-        free: The cells that are free.
+        borders: The pairs of cells at which they meet, and maybe more.
         clearance: How far each is from what is not, metres.
         enough: The clearance that a door's point needs, where there is as much, metres.
     """
-    walkable = np.where(free, labels, 0)
-    padded = np.pad(walkable, 1)
     found: list[_Opening] = []
-    pairs: dict[tuple[int, int], list[NDArray[np.intp]]] = {}
-    here = padded[1:-1, 1:-1]
     # On the side of the lower number, so that a border is one cell wide.
-    for up, right in ((0, 1), (2, 1), (1, 0), (1, 2)):
-        other = padded[up : up + here.shape[0], right : right + here.shape[1]]
-        cells = np.argwhere((here > 0) & (other > here))
-        beside = other[cells[:, 0], cells[:, 1]]
-        own = here[cells[:, 0], cells[:, 1]]
-        for pair in np.unique(np.stack([own, beside], axis=1), axis=0):
-            mask = (own == pair[0]) & (beside == pair[1])
-            pairs.setdefault((int(pair[0]), int(pair[1])), []).append(cells[mask])
-    for rooms, several in sorted(pairs.items()):
-        cells = np.unique(np.vstack(several), axis=0)
-        low, high = cells.min(axis=0), cells.max(axis=0)
-        window = np.zeros(tuple(high - low + 1), np.uint8)
-        window[tuple((cells - low).T)] = 1
+    rooms_ = labels.ravel()[borders]
+    differ = rooms_[0] != rooms_[1]
+    rooms_, borders = rooms_[:, differ], borders[:, differ]
+    low = np.where(rooms_[0] < rooms_[1], borders[0], borders[1])
+    rooms_ = np.sort(rooms_, axis=0)
+    order = np.lexsort((rooms_[1], rooms_[0]))
+    rooms_, low = rooms_[:, order], low[order]
+    begins = np.flatnonzero(np.diff(rooms_, axis=1, prepend=-1).any(axis=0)).tolist()
+    for begin, end in pairwise([*begins, len(low)]):
+        rooms = (int(rooms_[0, begin]), int(rooms_[1, begin]))
+        cells = np.stack(np.unravel_index(np.unique(low[begin:end]), labels.shape), axis=1)
+        corner, far = cells.min(axis=0), cells.max(axis=0)
+        window = np.zeros(tuple(far - corner + 1), np.uint8)
+        window[tuple((cells - corner).T)] = 1
         # Steps of a slanted border touch at corners, or miss by a cell.
         grown = cv2.dilate(window, np.ones((3, 3), np.uint8))
         pieces = cv2.connectedComponents(grown, connectivity=8)[1]
-        which = pieces[tuple((cells - low).T)]
+        which = pieces[tuple((cells - corner).T)]
         for piece in np.unique(which):
             mine = cells[which == piece]
             found.append(_opening_of(rooms, mine, clearance, enough))
@@ -714,15 +727,14 @@ def point_in(
         radius: Of the robot, metres.
         resolution: Side of a cell, metres.
     """
-    cells = np.argwhere(room & reach)
-    clear = clearance[cells[:, 0], cells[:, 1]]
     # Also far from the room's own borders, so that the robot is clearly inside.
-    inside = cv2.distanceTransform(np.pad(room, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
-    deep = np.minimum(clear, resolution * inside[cells[:, 0], cells[:, 1]])
-    enough = deep >= min(float(deep.max()), _NEAR_POINT * radius) - 1e-6
-    good = cells[enough]
-    middle = np.argwhere(room).mean(axis=0)
-    row, column = good[np.argmin(np.hypot(*(good - middle).T))]
+    deep = cv2.distanceTransform(np.pad(room, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    deep = np.where(room & reach, np.minimum(clearance, resolution * deep), -1.0)
+    good = np.argwhere(deep >= min(float(deep.max()), _NEAR_POINT * radius) - 1e-6)
+    rows, columns = room.sum(axis=1), room.sum(axis=0)
+    middle = [(each @ np.arange(len(each))) / each.sum() for each in (rows, columns)]
+    away = np.hypot(good[:, 0] - np.float32(middle[0]), good[:, 1] - np.float32(middle[1]))
+    row, column = good[np.argmin(away)]
     return float(column), float(row)
 
 

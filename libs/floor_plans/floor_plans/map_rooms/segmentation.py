@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.map_rooms import joining, openings
-from floor_plans.occupancy_grid import Grid, distance_to
+from floor_plans.occupancy_grid import Grid, boxes, distance_to, totals
 
 Labels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -42,6 +42,8 @@ _BENEATH = 0.9
 """Floor that lies deeper below furniture is not given to the room beside it, metres."""
 _NARROW = 0.7
 """Clearance in a passage, as a share of that beyond it, below which it is a cut."""
+_BEHIND_WALL = 0.08
+"""Squares with less clearance may lie on both sides of a wall of one cell, metres."""
 _LOWEST, _STEP = 0.15, 1.08
 """Clearances at which the wide parts of the floor are looked for: the lowest, and the ratio."""
 
@@ -66,32 +68,38 @@ class Segmentation:
 
     def joined(self, first: int, second: int) -> Segmentation:
         """Return the rooms with two of them made one, numbered without a gap."""
-        keeps, goes = sorted((first, second))
-        numbers = np.arange(self.rooms + 1, dtype=np.int32)
-        numbers[goes] = keeps
-        numbers[numbers > goes] -= 1
-        areas = np.bincount(self.working_labels.ravel(), minlength=self.rooms + 1)
-        smaller = goes if areas[keeps] >= areas[goes] else keeps
-        long = {each for each in self.corridors if each != smaller}
-        corridors = frozenset(int(numbers[each]) for each in long)
-        return replace(
-            self,
-            labels=numbers[self.labels],
-            rooms=self.rooms - 1,
-            corridors=corridors,
-            working_labels=numbers[self.working_labels],
-        )
+        return self.all_joined([(first, second)])
 
     def all_joined(self, pairs: Sequence[tuple[int, int]]) -> Segmentation:
         """Return the rooms with those of each pair made one; the numbers are those of now."""
-        found = self
-        now = list(range(self.rooms + 1))
-        for first, second in pairs:
-            keeps, goes = sorted((now[first], now[second]))
+        areas = totals(self.working_labels, self.rooms + 1)
+        into, long = list(range(self.rooms + 1)), set(self.corridors)
+        for pair in pairs:
+            keeps, goes = sorted(_root(into, each) for each in pair)
             if keeps != goes:
-                found = found.joined(keeps, goes)
-                now = [keeps if n == goes else n - (n > goes) for n in now]
-        return found
+                # Both are what the larger one is.
+                larger = keeps if areas[keeps] >= areas[goes] else goes
+                long = long - {keeps} | ({keeps} if larger in long else set())
+                areas[keeps] += areas[goes]
+                into[goes] = keeps
+        roots = sorted({_root(into, each) for each in into})
+        numbers = np.array([roots.index(_root(into, each)) for each in into], np.int32)
+        working_labels = numbers[self.working_labels]
+        same = self.labels is self.working_labels
+        return replace(
+            self,
+            labels=working_labels if same else numbers[self.labels],
+            rooms=len(roots) - 1,
+            corridors=frozenset(int(numbers[each]) for each in long if into[each] == each),
+            working_labels=working_labels,
+        )
+
+
+def _root(into: list[int], each: int) -> int:
+    while into[each] != each:
+        into[each] = into[into[each]]
+        each = into[each]
+    return each
 
 
 def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
@@ -119,11 +127,12 @@ def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
     labels = joining.joined(parts, cuts, clearance, CELL)[parts]
     labels = np.where(cleared, spread(labels), 0)
     labels = _with_floor_below_furniture(labels, cleared)
-    labels = np.where(known & free & (labels == 0), spread(labels), labels)
+    if known.any():
+        labels = np.where(known & free & (labels == 0), spread(labels), labels)
     labels = _numbered(labels)
     count = int(labels.max())
-    area = np.bincount(labels.ravel(), minlength=count + 1) * CELL**2
-    depth = np.bincount(labels.ravel(), weights=clearance.ravel(), minlength=count + 1) * CELL**2
+    area = totals(labels, count + 1) * CELL**2
+    depth = totals(labels, count + 1, clearance) * CELL**2
     corridors = frozenset(
         number
         for number in range(1, count + 1)
@@ -202,46 +211,48 @@ def _saddles(free: Mask, clearance: NDArray[np.float32]) -> list[tuple[int, int,
     """Return where passages are narrowest: row, column and clearance in cells.
 
     The floor is divided into basins around its widest places (watershed of the clearance); where
-    two basins meet with much less clearance than both have, there is a saddle.
+    two basins meet with much less clearance than both have, there is a saddle. That is looked for
+    in squares of two by two cells, each as clear as its clearest cell.
     """
     if not free.any():
         return []
     from skimage.segmentation import watershed  # takes 0.3 s: most only show a place
 
-    basins = watershed(-clearance, _widest_places(clearance), mask=free)
+    rows, columns = clearance.shape
+    even = np.pad(clearance, ((0, rows % 2), (0, columns % 2)))
+    squares = np.maximum(
+        np.maximum(even[::2, ::2], even[1::2, ::2]), np.maximum(even[::2, 1::2], even[1::2, 1::2])
+    )
+    basins = watershed(-squares, _widest_places(squares), mask=squares > 0)
     peaks = np.zeros(int(basins.max()) + 1, np.float32)
-    np.maximum.at(peaks, basins.ravel(), clearance.ravel())
-    meeting = _meeting(basins, clearance)
+    np.maximum.at(peaks, basins.ravel(), squares.ravel())
+    meeting = _meeting(basins, squares)
     into = list(range(len(peaks)))
-
-    def root(basin: int) -> int:
-        while into[basin] != basin:
-            into[basin] = into[into[basin]]
-            basin = into[basin]
-        return basin
-
     narrow = []
     for (first, second), (level, cell) in sorted(meeting.items(), key=lambda each: -each[1][0]):
-        one, other = root(first), root(second)
+        one, other = _root(into, first), _root(into, second)
         if one == other:
             continue
         if level >= _NARROW * min(peaks[one], peaks[other]):
             into[other] = one
             peaks[one] = max(peaks[one], peaks[other])
-        else:
-            narrow.append((first, second, level, cell))
-    columns = free.shape[1]
-    return [
-        (cell // columns, cell % columns, level / CELL)
-        for first, second, level, cell in narrow
-        if root(first) != root(second)
-    ]
+        elif level > _BEHIND_WALL:
+            narrow.append((first, second, cell))
+    found = []
+    for first, second, cell in narrow:
+        if _root(into, first) != _root(into, second):
+            row, column = (2 * each for each in divmod(cell, squares.shape[1]))
+            square = even[row : row + 2, column : column + 2]
+            up, right = divmod(int(np.argmax(square)), 2)
+            found.append((row + up, column + right, float(square[up, right]) / CELL))
+    return found
 
 
 def _widest_places(clearance: NDArray[np.float32]) -> Labels:
     """Return a number at each place that is wider than what is around it, shape of the map."""
     places: Labels = np.zeros(clearance.shape, np.int32)
-    known = 0
+    # A cell of each place that was found: what is wide around it grows from level to level.
+    rows, columns = np.zeros(0, np.intp), np.zeros(0, np.intp)
     highest = float(clearance[np.isfinite(clearance)].max(initial=0.0))
     levels = max(1, math.ceil(math.log(max(highest / _LOWEST, 1.0), _STEP)) + 1)
     for power in reversed(range(levels)):
@@ -249,14 +260,17 @@ def _widest_places(clearance: NDArray[np.float32]) -> Labels:
             (clearance >= _LOWEST * _STEP**power).astype(np.uint8), connectivity=8
         )
         new = np.ones(count, np.bool_)
-        new[np.unique(pieces[places > 0])] = False
+        new[pieces[rows, columns]] = False
         new[0] = False
         if new.any():
             numbers = np.zeros(count, np.int32)
-            numbers[new] = known + 1 + np.arange(int(new.sum()))
-            known += int(new.sum())
-            here = new[pieces]
-            places[here] = numbers[pieces[here]]
+            numbers[new] = len(rows) + 1 + np.arange(int(new.sum()))
+            here = np.nonzero(new[pieces])
+            which = pieces[here]
+            places[here] = numbers[which]
+            first = np.unique(which, return_index=True)[1]
+            rows = np.concatenate([rows, here[0][first]])
+            columns = np.concatenate([columns, here[1][first]])
     return places
 
 
@@ -298,9 +312,11 @@ def spread(labels: Labels) -> Labels:
         cv2.DIST_MASK_5,
         labelType=cv2.DIST_LABEL_PIXEL,
     )[1]
+    seeds = labels > 0
     of_seed = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_seed[nearest[labels > 0]] = labels[labels > 0]
-    return np.asarray(of_seed[nearest])
+    of_seed[nearest[seeds]] = labels[seeds]
+    # In place, as such a field of a large map takes 64 MB; clipping needs no copy.
+    return np.asarray(np.take(of_seed, nearest, out=nearest, mode='clip'))
 
 
 def _with_floor_below_furniture(labels: Labels, free: Mask) -> Labels:
@@ -323,15 +339,20 @@ def _with_floor_below_furniture(labels: Labels, free: Mask) -> Labels:
     furniture = sizes[:, cv2.CC_STAT_AREA] * CELL**2 < SMALLEST_ROOM + 1
     furniture &= ~_at_edge(sizes, free.shape)
     furniture[0] = False
-    near = distance_to(labels > 0, CELL) <= _BENEATH
-    below = (furniture[blocks] | closed) & (labels == 0) & near
+    below = (furniture[blocks] | closed) & (labels == 0)
+    if not below.any():
+        return labels
+    del blocks, closed, thick
+    below &= distance_to(labels > 0, CELL) <= _BENEATH
     return np.where(below, spread(labels), labels)
 
 
 def _numbered(labels: Labels) -> Labels:
     """Return labels from 1 on without gaps, in reading order: from the north, then the west."""
-    names, first = np.unique(labels[::-1], return_index=True)
-    order = [name for _, name in sorted(zip(first, names, strict=True)) if name]
+    upright = labels[::-1]
+    first = []
+    for number, (rows, _) in boxes(upright).items():
+        first.append((rows.start, int(np.argmax(upright[rows.start] == number)), number))
     numbers = np.zeros(int(labels.max()) + 1, np.int32)
-    numbers[order] = np.arange(1, len(order) + 1)
+    numbers[[number for _, _, number in sorted(first)]] = np.arange(1, len(first) + 1)
     return np.asarray(numbers[labels])
