@@ -96,6 +96,9 @@ def include(context: LaunchContext) -> list[IncludeLaunchDescription]:
         values = {
             '/**': {'ros__parameters': {'use_sim_time': simulated}},
             '/**/motion_controller': {'ros__parameters': {'navigator': 'nav2'}},
+            '/**/collision_monitor': {
+                'ros__parameters': {'robot.wanted_type': profile.types.command}
+            },
         }
         clock.write_text(yaml.safe_dump(values), 'utf-8')
         patrol = {
@@ -105,8 +108,7 @@ def include(context: LaunchContext) -> list[IncludeLaunchDescription]:
             'params': str(clock),
             # Nav2 has these names, too.
             'remap': ','.join(f'{old}:={new}' for old, new in out_of_nav2s_way().items()),
-            # Nav2's own collision monitor stands before the base.
-            'without': 'collision_monitor',
+            'without': '' if profile.dock.monitor == 'own' else 'collision_monitor',
         }
         included.append(_included(own / 'launch' / 'surveillance.launch.py', patrol))
     return included

@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist, TwistStamped
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import LaserScan
@@ -61,6 +61,7 @@ from surveillance_runtime.place_parameters import place_zones
 from surveillance_runtime.process import run_node
 from surveillance_runtime.profile.check_up import ExpectedTopic, findings
 from surveillance_runtime.profile.parameters import declared_frames
+from surveillance_runtime.profile.record import COMMAND_TYPES
 from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.sensing.transforms import ScanReader
 from surveillance_runtime.state_topics import (
@@ -109,6 +110,12 @@ class MonitorSettings:
         10.0,
     )
 
+    wanted_type: str = parameter(
+        'Twist',
+        'Type of the velocity on cmd_vel: Twist, or TwistStamped where Nav2 drives.',
+        choices=COMMAND_TYPES,
+        name='robot.wanted_type',
+    )
     state_file: str = parameter(
         OWN,
         'File that keeps over every restart that the robot is stopped; auto: one of this robot in '
@@ -193,7 +200,10 @@ class CollisionMonitor(PatrolNode):
             self._settings.longest_silence,
             frames.base,
         )
-        self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
+        if self._settings.wanted_type == 'TwistStamped':
+            self.create_subscription(TwistStamped, 'cmd_vel', self._on_stamped_command, 1)
+        else:
+            self.create_subscription(Twist, 'cmd_vel', self._on_command, 1)
         self.create_subscription(Twist, MANUAL, self._on_manual, 1)
         self._lidar.subscribe(self._on_scan)
         StateSubscription(
@@ -225,6 +235,9 @@ class CollisionMonitor(PatrolNode):
     def _on_manual(self, message: Twist) -> None:
         self._manual_until = time.monotonic() + MANUAL_SECONDS
         self._take_command(message)
+
+    def _on_stamped_command(self, message: TwistStamped) -> None:
+        self._on_command(message.twist)
 
     def _on_command(self, message: Twist) -> None:
         if time.monotonic() >= self._manual_until:

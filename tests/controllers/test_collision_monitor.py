@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist, TwistStamped
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
 
@@ -87,6 +87,27 @@ def test_a_foreign_command_is_stopped_before_a_wall_and_without_a_scan(graph: An
     command.linear.x = math.nan
     graph.until(lambda: passes(3.0) == 0.0)
     assert told_of('may be covered or broken') == 1
+
+
+def test_what_nav2_commands_is_limited_alike(graph: Any) -> None:
+    graph.add(
+        CollisionMonitor,
+        {'robot.wanted_type': 'TwistStamped', 'robot.command_type': 'TwistStamped'},
+    )
+    told = graph.listen(TwistStamped, 'cmd_vel_monitored', 1)
+    commands = graph.node.create_publisher(TwistStamped, 'cmd_vel', 1)
+    scans = graph.node.create_publisher(LaserScan, 'scan', SENSOR_QOS)
+    command = TwistStamped()
+    command.twist.linear.x = 0.5
+
+    def passes(gap: float) -> Any:
+        ranges = [0.24 + gap] * 21
+        scans.publish(LaserScan(angle_min=-0.2, angle_increment=0.02, range_max=8.0, ranges=ranges))
+        commands.publish(command)
+        return told[-1].twist.linear.x if told else None
+
+    graph.until(lambda: passes(3.0) == 0.5)
+    graph.until(lambda: 0.0 <= passes(0.01) < 0.2)
 
 
 def test_a_base_that_goes_round_the_monitor_is_told_of_once(

@@ -13,8 +13,9 @@ from typing import Any
 import pytest
 import yaml
 
+from surveillance_runtime.configuration import Configuration
 from surveillance_runtime.parameters import ParameterError
-from surveillance_runtime.profile import read_profile
+from surveillance_runtime.profile import profile_layer, read_profile
 from surveillance_runtime.profile.nav2_parameters import laid_over
 from tests.launch_stand_ins import Argument, Configured
 
@@ -73,6 +74,19 @@ def test_a_round_robot_with_two_lidars_marks_with_both(tmp_path: Path) -> None:
     assert layer['scan2']['data_type'] == 'LaserScan'
 
 
+def test_nav2_speaks_to_the_monitor_that_the_profile_names(tmp_path: Path) -> None:
+    path = tmp_path / 'robot.yaml'
+    topics = 'topics: {command: cmd_vel, wanted: wanted}\ntypes: {command: TwistStamped}\n'
+    for monitor, out, is_monitored in (('nav2', 'cmd_vel', False), ('own', 'wanted', True)):
+        path.write_text(f'{topics}dock: {{navigator: nav2, monitor: {monitor}}}\n')
+        file = read_profile(path)
+        given = laid_over(NAV2, file.profile)['collision_monitor']['ros__parameters']
+        assert given['cmd_vel_out_topic'] == out
+        assert file.profile.is_monitored is is_monitored
+        own = Configuration((profile_layer(file),)).resolve('collision_monitor')
+        assert own['robot.wanted_type'].value == 'TwistStamped'
+
+
 @dataclasses.dataclass
 class Included:
     source: str
@@ -120,6 +134,7 @@ def test_the_launch_file_starts_nav2_and_the_patrol_with_one_robot(include: Any)
     parameters = yaml.safe_load(Path(given['params_file']).read_text())
     assert parameters['slam_toolbox']['ros__parameters']['base_frame'] == 'base_footprint'
     assert patrol == 'surveillance.launch.py'
+    assert own['without'] == 'collision_monitor'
     assert (own['mode'], own['robot'], own['map']) == ('ROBOT', 'turtlebot3_waffle', 'place.yaml')
     values = yaml.safe_load(Path(own['params']).read_text())
     assert values['/**']['ros__parameters']['use_sim_time'] is True

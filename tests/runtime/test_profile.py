@@ -71,6 +71,7 @@ def test_another_robot_s_topics_types_frames_and_lidars_reach_the_nodes(tmp_path
     merged.check()
     told = {key: each.value for key, each in merged.resolve('collision_monitor').items()}
     assert told['robot.command_type'] == 'TwistStamped'
+    assert told['robot.wanted_type'] == 'Twist'
     assert told['robot.scans'] == ['front', 'rear']
     assert told['lidar_mounts'] == pytest.approx([0.25, 0, 0, 0, -0.25, 0, 3.14, 3.1416])
     assert told['robot_radius'] == pytest.approx(0.3606, abs=1e-4)

@@ -65,7 +65,8 @@ def settings(profile: RobotProfile, *, use_sim_time: bool = False) -> Iterator[N
     yield from _of_speeds(profile)
     yield Nav2Setting(('collision_monitor', 'base_frame_id'), frames.base)
     yield Nav2Setting(('collision_monitor', 'odom_frame_id'), frames.odom)
-    yield Nav2Setting(('collision_monitor', 'cmd_vel_out_topic'), topics.command)
+    out = topics.wanted if profile.dock.monitor == 'own' else topics.command
+    yield Nav2Setting(('collision_monitor', 'cmd_vel_out_topic'), out)
     stamped = profile.types.command == 'TwistStamped'
     for node in (
         'controller_server',

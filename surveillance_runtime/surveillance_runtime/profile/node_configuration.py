@@ -91,6 +91,7 @@ def _of_commands(file: ProfileFile) -> Iterator[Entry]:
     origin = file.profile.origins.get('types.command', f'{file.path} (by default)')
     for node in (MONITOR, 'simulator'):
         yield Entry(f'/**/{node}', 'robot.command_type', file.profile.types.command, origin)
+    yield Entry(f'/**/{MONITOR}', 'robot.wanted_type', file.profile.wanted_type, origin)
 
 
 def check_behaviour(file: ProfileFile, behaviour: str) -> None:

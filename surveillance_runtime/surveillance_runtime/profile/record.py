@@ -253,6 +253,12 @@ class Docking:
     navigator: str = parameter(
         'own', 'Who drives the base: this project, or Nav2.', choices=('own', 'nav2')
     )
+    monitor: str = parameter(
+        'nav2',
+        'Whose collision monitor is last before the base where Nav2 drives; own: Nav2 publishes on '
+        '`topics.wanted`, and stop, zones and lidar of this project bind it.',
+        choices=('nav2', 'own'),
+    )
     docking: str = parameter(
         'none', 'What docks it where a way ends at the station.', choices=('none', 'opennav')
     )
@@ -290,4 +296,9 @@ class RobotProfile:
     @property
     def is_monitored(self) -> bool:
         """Whether this project's collision monitor guards the base; Nav2 has its own."""
-        return self.dock.navigator == 'own'
+        return 'own' in (self.dock.navigator, self.dock.monitor)
+
+    @property
+    def wanted_type(self) -> str:
+        """Type of the velocity on `topics.wanted`: Nav2 publishes what it would tell the base."""
+        return 'Twist' if self.dock.navigator == 'own' else self.types.command
