@@ -6,8 +6,9 @@ import json
 import os
 import signal
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -23,6 +24,7 @@ SERVERS = (
     ('nav2_bt_navigator', 'bt_navigator', 'bt_navigator'),
     ('nav2_velocity_smoother', 'velocity_smoother', 'velocity_smoother'),
     ('nav2_collision_monitor', 'collision_monitor', 'collision_monitor'),
+    ('opennav_docking', 'opennav_docking', 'docking_server'),
 )
 """Package, program, node."""
 CHAIN = ('velocity_smoother', 'collision_monitor')
@@ -35,6 +37,23 @@ RPP = {
     'use_rotate_to_heading': True,
     'use_collision_detection': True,
 }
+
+
+DOCK = {
+    'plugin': 'opennav_docking::SimpleChargingDock',
+    'docking_threshold': 0.05,
+    'staging_x_offset': -0.7,
+    'use_external_detection_pose': False,
+    'use_battery_status': True,
+    'use_stall_detection': False,
+}
+"""A dock that nobody sees, which is where the map has it."""
+
+
+def built_here() -> str:
+    """Return the prefixes of what `build.sh` builds."""
+    folder = Path(os.environ.get('NAV2_BUILD', Path(__file__).parents[2] / 'build' / 'nav2'))
+    return f'{folder}/inst:{folder}/be'
 
 
 def prefixes(given: str) -> list[Path]:
@@ -51,57 +70,56 @@ class Nav2Stack:
     """Nav2's servers and their lifecycle managers.
 
     Args:
-        installed: The prefixes.
+        options: Of the command line: the prefixes, nav2_params.yaml that the profile is laid over,
+            the controller (rpp, or mppi as the file has it), the namespace, whether the docking
+            server and the collision monitor are started.
         profile: The robot.
         map_file: The map in map_server's format.
         folder: Where parameters and logs go.
         domain: ROS domain.
-        parameters: nav2_params.yaml that the profile is laid over.
-        controller: rpp, or mppi as the file has it.
     """
 
     def __init__(
-        self,
-        installed: list[Path],
-        profile: RobotProfile,
-        map_file: Path,
-        folder: Path,
-        domain: int,
-        parameters: Path,
-        controller: str,
+        self, options: Any, profile: RobotProfile, map_file: Path, folder: Path, domain: int
     ) -> None:
-        self._installed, self._folder = installed, folder
+        self._installed, self._folder = options.installed, folder
+        self._space = options.namespace
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
-        self._there = [row for row in SERVERS if self._program(*row[:2]) is not None]
-        nodes = [row[2] for row in self._there]
-        self._chained = set(CHAIN) <= set(nodes)
+        left_out = set() if options.docking else {'docking_server'}
+        self._there = [
+            row for row in SERVERS if self._program(*row[:2]) is not None and row[2] not in left_out
+        ]
+        self._chained = set(CHAIN) <= {row[2] for row in self._there} and not options.no_monitor
         if not self._chained:
-            self._there = [
-                row
-                for row in self._there
-                if row[2] not in ('velocity_smoother', 'collision_monitor')
-            ]
-            nodes = [row[2] for row in self._there]
-        merged = laid_over(yaml.safe_load(parameters.read_text('utf-8')), profile)
-        if controller == 'rpp':
+            self._there = [row for row in self._there if row[2] not in CHAIN]
+        nodes = [row[2] for row in self._there]
+        merged = laid_over(yaml.safe_load(options.params.read_text('utf-8')), profile)
+        if options.controller == 'rpp':
             speed = {'desired_linear_vel': profile.drive.speed}
             merged['controller_server']['ros__parameters']['FollowPath'] = RPP | speed
         merged['map_server'] = {'ros__parameters': {'yaml_filename': str(map_file)}}
+        monitor = merged['collision_monitor']['ros__parameters']
+        monitor['FootprintApproach']['footprint_topic'] = 'local_costmap/published_footprint'
+        dock = {'dock_plugins': ['simple_charging_dock'], 'simple_charging_dock': DOCK}
+        dock['base_frame'] = profile.frames.base
+        merged['docking_server']['ros__parameters'] |= dock
         for name, members in (
             ('lifecycle_manager_localization', [n for n in nodes if n in LOCALIZERS]),
             ('lifecycle_manager_navigation', [n for n in nodes if n not in LOCALIZERS]),
         ):
             values = {'autostart': True, 'node_names': members, 'bond_timeout': 4.0}
             merged[name] = {'ros__parameters': values}
+        if self._space:
+            merged = {self._space: merged}
         self._parameters = folder / 'nav2_params.yaml'
         # Through JSON, for rcl takes no aliases of YAML.
         self._parameters.write_text(yaml.safe_dump(json.loads(json.dumps(merged))), 'utf-8')
-        libraries = [each / 'lib' for each in installed]
-        for each in installed:
+        libraries = [each / 'lib' for each in self._installed]
+        for each in self._installed:
             libraries += sorted(each.glob('lib/python3*/site-packages/ros_*.libs'))
         self.environ = {
             **os.environ,
-            'AMENT_PREFIX_PATH': os.pathsep.join(map(str, installed)),
+            'AMENT_PREFIX_PATH': os.pathsep.join(map(str, self._installed)),
             'LD_LIBRARY_PATH': os.pathsep.join(map(str, libraries)),
             'ROS_DOMAIN_ID': str(domain),
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
@@ -128,6 +146,8 @@ class Nav2Stack:
         words += (
             ['-r', f'__node:={node}'] if package in ('nav2_lifecycle_manager', 'nav2_amcl') else []
         )
+        if self._space:
+            words += ['-r', f'__ns:=/{self._space}', '-r', '/tf:=tf', '-r', '/tf_static:=tf_static']
         if self._chained and node in ('controller_server', 'behavior_server', 'velocity_smoother'):
             words += ['-r', 'cmd_vel:=cmd_vel_nav']
         with (self._folder / f'{node}.log').open('ab') as log:
@@ -157,25 +177,25 @@ class Nav2Stack:
                     continue
 
 
-def usage(pids: Mapping[str, int]) -> dict[str, tuple[float, float]]:
+def usage(pids: Iterable[int]) -> dict[int, tuple[float, float]]:
     """Return of each process its processor time so far, seconds, and its PSS, MB."""
-    found: dict[str, tuple[float, float]] = {}
+    found: dict[int, tuple[float, float]] = {}
     tick = os.sysconf('SC_CLK_TCK')
-    for name, pid in pids.items():
+    for pid in pids:
         try:
             fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
             rollup = Path(f'/proc/{pid}/smaps_rollup').read_text()
         except OSError:
             continue
         pss = next(int(line.split()[1]) for line in rollup.splitlines() if line.startswith('Pss:'))
-        found[name] = ((int(fields[11]) + int(fields[12])) / tick, pss / 1024)
+        found[pid] = ((int(fields[11]) + int(fields[12])) / tick, pss / 1024)
     return found
 
 
-def children_of(pid: int) -> dict[str, int]:
-    """Return the processes below one, by the name of the node that each runs."""
+def children_of(pid: int) -> Iterator[tuple[list[str], int]]:
+    """Yield the processes below one: the names of the nodes that each runs, and its number."""
     parents: dict[int, int] = {}
-    names: dict[int, str] = {}
+    nodes: dict[int, list[str]] = {}
     for folder in Path('/proc').glob('[0-9]*'):
         try:
             fields = (folder / 'stat').read_text().rpartition(')')[2].split()
@@ -183,17 +203,14 @@ def children_of(pid: int) -> dict[str, int]:
         except OSError:
             continue
         parents[int(folder.name)] = int(fields[1])
-        # `motion_controller=module:Class` is how the launcher names the node of a process.
-        named = [word.partition('=')[0] for word in words if ':' in word and '_node:' in word]
-        names[int(folder.name)] = (named or words)[0]
-
-    def is_below(each: int) -> bool:
-        while each in parents and each != pid:
-            each = parents[each]
-        return each == pid
-
-    below: dict[str, int] = {}
-    for each in parents:
-        if each != pid and is_below(each):
-            below[f'{names[each]}#{each}'] = each
-    return below
+        # `motion_controller=module:Class,...` is how the launcher names the nodes of a process.
+        named = [word for word in words if '=' in word and '_node:' in word]
+        nodes[int(folder.name)] = [
+            each.partition('=')[0] for word in named for each in word.split(',')
+        ]
+    for each, names in nodes.items():
+        at = each
+        while at in parents and at != pid:
+            at = parents[at]
+        if at == pid and names:
+            yield names, each
