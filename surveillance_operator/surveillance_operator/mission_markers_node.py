@@ -54,7 +54,7 @@ class MissionMarkers(PatrolNode):
         description.publish(String(data=urdf()))
         if TFMessage is None:
             self.get_logger().info('tf2_msgs is not installed: nothing is published on tf')
-        self._subscriber = MissionSubscriber(self, PERIOD)
+        self._subscriber = MissionSubscriber.of_process(self)
         self.spawn(self._work, 'markers')
 
     def _work(self) -> None:

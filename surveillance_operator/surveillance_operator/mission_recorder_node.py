@@ -101,7 +101,7 @@ class MissionRecorder(PatrolNode):
         self._subscriptions_by_topic: dict[str, PolledSubscription] = {}
         self._clashes: set[str] = set()
         self._unknown: set[str] = set()
-        self._subscriber = MissionSubscriber(self, STATE_PERIOD)
+        self._subscriber = MissionSubscriber.of_process(self)
         self.spawn(self._record, 'recording')
         if path.name == RECORDING:
             self.spawn(self._repair, 'repair')

@@ -11,7 +11,9 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from weakref import WeakValueDictionary
 
+from rclpy.context import Context
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from surveillance_operator.mission_changes import follow
@@ -34,6 +36,11 @@ SHARED = tuple(
 """The fields of a state that are the same for all robots of a fleet."""
 KEPT = ('notices', 'visited_at', 'urgent', 'links', 'restarts')
 """What is still known when another mission begins: who follows the ontology is told what goes."""
+
+
+TOGETHER_PERIOD = 0.4
+"""Seconds between two looks for nodes that share a subscriber."""
+_OF_PROCESS: WeakValueDictionary[tuple[Context, str], MissionSubscriber] = WeakValueDictionary()
 
 
 class WatchedClock:
@@ -123,6 +130,18 @@ class MissionSubscriber:
         self._others = OtherPoses(node) if streams and not robot else None
         self._robots: Mapping[str, MissionSubscriber] = {}
         node.spawn(self._run, 'mission subscriber')
+
+    @classmethod
+    def of_process(cls, node: PatrolNode) -> MissionSubscriber:
+        """Return the one subscriber that the nodes of a process and namespace have together.
+
+        It ends with the node that asked first: the nodes of a process end together.
+        """
+        key = node.context, node.get_namespace()
+        found = _OF_PROCESS.get(key)
+        if found is None or found._node.stopping.is_set():
+            found = _OF_PROCESS[key] = cls(node, TOGETHER_PERIOD)
+        return found
 
     @property
     def state(self) -> MissionState:

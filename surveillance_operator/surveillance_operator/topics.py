@@ -25,6 +25,7 @@ from sensor_msgs.msg import JointState, LaserScan, PointCloud2
 from std_msgs.msg import Bool, String, UInt8
 
 from armor_service.facts import ShortFact, parse_fact
+from floor_plans import Grid
 from surveillance_behaviour.conversions import decision_from, idleness_bounds_from
 from surveillance_interfaces.action import Control, FollowPath, ScanSurroundings
 from surveillance_interfaces.msg import (
@@ -162,8 +163,17 @@ def _fed_back(point: Any, old: MissionState) -> Fields:
     return moved((x, y, yaw), old)
 
 
-def _on_map(message: OccupancyGrid, _old: MissionState) -> Fields:
-    return {'grid': map_from(message, MOST_CELLS), 'trail': NO_POINTS}
+def _on_map(message: OccupancyGrid, old: MissionState) -> Fields:
+    grid, known = map_from(message, MOST_CELLS), old.place.grid
+    # It is repeated: what is drawn of it costs a fifth of a second.
+    if known is not None and _is_same(known, grid):
+        return {}
+    return {'grid': grid, 'trail': NO_POINTS}
+
+
+def _is_same(one: Grid, other: Grid) -> bool:
+    placed = one.resolution == other.resolution and tuple(one.origin) == tuple(other.origin)
+    return placed and np.array_equal(one.cells, other.cells)
 
 
 def _on_transition(message: FsmTransition, old: MissionState) -> Fields:

@@ -23,9 +23,11 @@ from surveillance_interfaces.msg import (
 )
 from surveillance_ontology.armor_server_node import ArmorServer
 from surveillance_ontology.ontology_map_builder_node import OntologyMapBuilder
+from surveillance_operator.mission_subscriber import MissionSubscriber
 from surveillance_operator.mission_view_node import MissionViewNode
 from surveillance_operator.page_state import PARTS
 from surveillance_runtime.conversions import cloud_from_points
+from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
 from tests.operator.peers import PLACE, Planner, Watcher, pose, say
 
@@ -152,3 +154,11 @@ def test_the_next_mission_begins_with_an_empty_picture(graph: Any) -> None:
     assert view.state.history.battery == ()
     assert view.see()[''].now > 1e9
     assert any('waiting for the next mission' in each.text for each in view.state.notices)
+
+
+def test_nodes_of_one_process_follow_the_mission_together(graph: Any) -> None:
+    first, second = graph.add(PatrolNode, name='first'), graph.add(PatrolNode, name='second')
+    shared = MissionSubscriber.of_process(first)
+    assert MissionSubscriber.of_process(second) is shared
+    first.stop()
+    assert MissionSubscriber.of_process(second) is not shared

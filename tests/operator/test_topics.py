@@ -10,6 +10,7 @@ import pytest
 from action_msgs.msg import GoalStatus, GoalStatusArray
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import JointState
 
 from armor_service.facts import parse_fact
@@ -110,3 +111,15 @@ def test_the_progress_of_a_scan_ends_with_its_goal() -> None:
 def test_a_topic_on_which_those_speak_who_only_look_on_tells_of_no_mission() -> None:
     everybody = {name for name, topic in TOPIC.items() if not topic.is_of_mission}
     assert everybody == {'/diagnostics', '/parameter_events', 'incidents'}
+
+
+def test_a_map_that_is_repeated_changes_nothing() -> None:
+    message = OccupancyGrid(data=[0, 100, 0, 0, 0, 100])
+    message.info.width, message.info.height, message.info.resolution = 3, 2, 0.5
+    (topic,) = (each for each in TOPICS if each.name == 'map')
+    state = read_message(MissionState(), topic, message).having(trail=np.ones((2, 2)))
+    assert read_message(state, topic, message) is state
+    message.data[0] = 100
+    changed = read_message(state, topic, message)
+    assert changed.place.grid is not state.place.grid
+    assert not len(changed.sensors.trail)

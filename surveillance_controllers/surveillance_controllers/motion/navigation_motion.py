@@ -27,7 +27,7 @@ from surveillance_controllers.controller_parameters import MotionSettings, Navig
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
 from surveillance_controllers.motion.command_publisher import CommandPublisher
-from surveillance_controllers.motion.door_sight import DoorSight
+from surveillance_controllers.motion.door_teller import DoorTeller
 from surveillance_controllers.motion.goal_execution import GoalExecution
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.place_recording import PlaceRecorder
@@ -53,7 +53,7 @@ from surveillance_runtime.sensing.sensors import OdometryReader
 from surveillance_runtime.sensing.silence import SensorWatch
 from surveillance_runtime.sensing.transforms import ScanReader
 from surveillance_runtime.spin_in_place import bearing_of
-from surveillance_runtime.state_topics import OwnedTopic, StateSubscription
+from surveillance_runtime.state_topics import StateSubscription
 
 
 class NavigationMotion:
@@ -90,8 +90,7 @@ class NavigationMotion:
             door_segments(node), guesses=guesses, zones=place_zones(node)
         )
         self._navigator.robot = robot
-        self._door_sight = DoorSight(door_segments(node))
-        self._doors_told: OwnedTopic[DoorStates] | None = None
+        self._doors = DoorTeller(node, door_segments(node))
         self._navigator.before_search = self._stand_for_search
         self._stands_for_search = False
         self._seeks = False
@@ -213,7 +212,7 @@ class NavigationMotion:
         positions = positions_of(described)
         self._knowledge.replace_known(positions)
         with self._goals.lock:
-            self._door_sight.take_doors(door_segments_of(described))
+            self._doors.take_doors(door_segments_of(described))
             self._navigator.take_place(
                 door_segments_of(described), zones_from(described), positions
             )
@@ -225,7 +224,7 @@ class NavigationMotion:
                 self._navigator.set_map(grid)
 
     def _on_doors(self, message: DoorStates) -> None:
-        if self._doors_told is not None:
+        if self._doors.tells:
             return  # its own: what is seen is judged by each scan anew, and is no wall of the map
         with self._goals.lock:
             self._navigator.set_closed(message.closed)
@@ -263,7 +262,8 @@ class NavigationMotion:
             if self._mounts.problem:
                 self._base.command(Velocity())
         self._see(scan, message.header.stamp, topic)
-        self._look_at_doors()
+        if (trusted := self._navigator.trusted) is not None:
+            self._doors.see(*trusted)
 
     def _see(self, scan: Scan, stamp: Any, topic: str = 'scan') -> None:
         measured = seconds_of(stamp)
@@ -284,23 +284,6 @@ class NavigationMotion:
                 self._recorder.tell(self._place, stamp)
             self._goals.stepped()
         self._reports.tell(stamp)
-
-    def _look_at_doors(self) -> None:
-        """Tell which doors are seen shut, where no contacts tell it (`door_states`)."""
-        trusted, before = self._navigator.trusted, self._door_sight.shut
-        if trusted is None or not self._door_sight.see(*trusted):
-            return
-        if self._doors_told is None:
-            if self._node.count_publishers('door_states'):
-                return
-            self._doors_told = OwnedTopic(self._node, DoorStates, 'door_states')
-        shut = self._door_sight.shut
-        for door in sorted(shut ^ before):
-            words = 'is seen shut' if door in shut else 'is no longer taken for shut'
-            self._node.get_logger().info(f'door {door} {words}')
-        self._doors_told.publish(
-            DoorStates(open=sorted(self._door_sight.doors - shut), closed=sorted(shut))
-        )
 
     def _stand_for_search(self) -> None:
         """Brake for as long as a search takes: until the next scan is seen."""
