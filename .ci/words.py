@@ -5,7 +5,8 @@
     python3 .ci/words.py FOLDER        # the same of another checkout
 
 Prose is what stands outside code blocks, tables and headings. Written by a program, and left out:
-the pages of `GENERATED` and what stands between its marks in others. `tests/test_words.py` holds the bounds.
+the pages of `GENERATED`, and what stands between marks in others. `tests/test_words.py` holds the
+bounds.
 """
 
 from __future__ import annotations
@@ -45,6 +46,10 @@ BANNED = {
     'has somebody': 'name who',
 }
 """What a reader does not search for, or what says nothing, with what to write."""
+
+
+ITEM = re.compile(r'^\s*([-*]|\d+\.)\s+')
+"""How an item of a list begins."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ def read(path: Path, checkout: Path) -> Page:
 def sentences(text: str) -> Iterator[str]:
     """Yield the sentences of Markdown without tables, headings and code."""
     lines = (
-        '' if re.match(r'\s*(\||#|<|!\[|    \S)', line) else re.sub(r'^\s*([-*]|\d+\.)\s+', '\n\n', line)
+        '' if re.match(r'\s*(\||#|<|!\[|    \S)', line) else re.sub(ITEM, '\n\n', line)
         for line in text.splitlines()
     )
     plain = re.sub(r'!?\[([^\]]*)\]\([^)]*\)', r'\1', '\n'.join(lines))

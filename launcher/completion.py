@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 
 SHELLS = ('bash', 'zsh')
-_OPTION = re.compile(r'(?<![\w-])--[a-z][a-z-]+')
+_OPTION = re.compile(r'(?<![\w-])--[a-z][a-z0-9-]+')
 
 
 def options_in(help_text: str) -> list[str]:

@@ -69,16 +69,18 @@ def help_of(name: str) -> str:
 
 def all_helps() -> dict[str, str]:
     """Return what each command says to `--help` now, by name; imports all of them."""
+    return {name: printed(main_of(name), ['--help']) for name in COMMANDS}
+
+
+def printed(command: Callable[[list[str]], int], argv: list[str]) -> str:
+    """Return what a command prints, 80 columns wide and without colours."""
     from unittest import mock  # here: `--help` of the launcher is to be quick
 
-    helps = {}
-    for name in COMMANDS:
-        said = io.StringIO()
-        with (
-            mock.patch.dict(os.environ, COLUMNS='80', NO_COLOR='1'),
-            contextlib.redirect_stdout(said),
-            contextlib.suppress(SystemExit),
-        ):
-            main_of(name)(['--help'])
-        helps[name] = said.getvalue()
-    return helps
+    said = io.StringIO()
+    with (
+        mock.patch.dict(os.environ, COLUMNS='80', NO_COLOR='1'),
+        contextlib.redirect_stdout(said),
+        contextlib.suppress(SystemExit),
+    ):
+        command(argv)
+    return said.getvalue()

@@ -22,7 +22,7 @@ from typing import Any
 
 from floor_plans.parameters import GEOMETRY_KEYS, PATROL_KEYS, PLACE_KEYS
 from launcher import package_commands
-from launcher.environment import CHECKOUT
+from launcher.environment import CHECKOUT, PROGRAM
 from surveillance_runtime import alarms, node_table
 from surveillance_runtime.configuration import (
     SCHEMA,
@@ -70,7 +70,8 @@ themselves; a test compares. The fields of the types, with units, stand in
   are state topics: their owner repeats them and answers whoever else publishes them
   ([Architecture](../explanation/architecture.md#threads-and-time)). `state/battery_low` is
   published on change only; `battery_low` is the same, repeated.
-- Each node publishes its health on `/diagnostics` ([Long runs](../how-to/long_runs.md#health)).
+- Each node publishes its health on `/diagnostics`
+  ([Long runs](../how-to/long_runs.md#4-look-at-its-health)).
 - A node that calls `ontology_map/reference_name` uses the ontology after that: it calls
   `armor_interface_srv` or `armor_interface_serialized_srv`, and some subscribe `fact_changes`. Only
   `initial_state` just waits for the map.
@@ -304,6 +305,32 @@ def _named(nodes: Iterable[str]) -> str:
     return ', '.join(f'`{name}`' for name in sorted(names))
 
 
+_CLI = """\
+# Commands
+
+What each command says to `--help`, written by `python3 launch.py params --write`; a test compares.
+"""
+
+
+_OWN_COMMANDS = ('explore', 'node', 'list', 'params', 'service', 'setup', 'lock', 'test', 'lint')
+
+
+def cli_page(helps: Mapping[str, str]) -> str:
+    """Return the page docs/reference/cli.md.
+
+    Args:
+        helps: What each command of a package says to `--help`, by name.
+    """
+    from launcher.cli import main
+
+    texts = {'': package_commands.printed(main, ['--help'])}
+    texts |= {name: package_commands.printed(main, [name, '--help']) for name in _OWN_COMMANDS}
+    parts = [_CLI]
+    for name, text in (texts | dict(helps)).items():
+        parts.append(f'\n## {f"{PROGRAM} {name}".strip()}\n\n```text\n{text.strip()}\n```\n')
+    return ''.join(parts)
+
+
 def as_json(tables: Mapping[str, Any]) -> str:
     """Return the schema file's content."""
     return json.dumps(tables, indent=1, ensure_ascii=False) + '\n'
@@ -348,9 +375,11 @@ def write(checkout: Path) -> list[Path]:
         'interfaces.md': interfaces_page(found),
         'alarms.md': alarms.page(),
     }
+    helps = package_commands.all_helps()
+    pages['cli.md'] = cli_page(helps)
     for name, text in pages.items():
         (checkout / 'docs' / 'reference' / name).write_text(text, encoding='utf-8')
-    package_commands.HELP.write_text(as_json(package_commands.all_helps()), encoding='utf-8')
+    package_commands.HELP.write_text(as_json(helps), encoding='utf-8')
     return [
         SCHEMA,
         *(checkout / 'docs' / 'reference' / name for name in pages),

@@ -55,7 +55,7 @@ def test_its_options_are_those_of_the_commands() -> None:
         for line in PAGE.splitlines()
         if line.startswith('python3 launch.py')
     }
-    assert commands == {'import', 'doctor', ''}
+    assert commands == {'import', 'setup', 'doctor', ''}
     for command in commands:
         words = [sys.executable, 'launch.py', *filter(None, [command]), '--help']
         said = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout

@@ -230,11 +230,9 @@ _HEAD = """\
 # Alarms
 
 Every kind of incident, written by `python3 launch.py params --write` from
-`surveillance_runtime/alarms.py`; a test compares. How they are called, acknowledged and shelved is
-said in [Long runs](../how-to/long_runs.md#incidents) and [Watch](../how-to/watch.md). In
-ISA-18.2's words: an incident of severity `alarm` calls a person until somebody acknowledges
-it, and returns to normal when it has been away for its off-delay: what comes and goes at a bound is
-one alarm and one all clear.
+`surveillance_runtime/alarms.py`; a test compares. [Answer alarms](../how-to/answer_alarms.md) says
+how they are acknowledged and shelved. An incident of severity `alarm` calls a person until somebody
+acknowledges it. It returns to normal when it has been away for its off-delay (ISA-18.2).
 
 | cause | severity | what | begins | is over | what to do |
 |---|---|---|---|---|---|""".splitlines()

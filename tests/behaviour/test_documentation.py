@@ -12,7 +12,7 @@ from surveillance_behaviour.machines import MACHINES
 
 from .scripted_world import World
 
-DOCUMENT = Path(__file__).parents[2] / 'docs' / 'explanation' / 'policy.md'
+DOCUMENT = Path(__file__).parents[2] / 'docs' / 'reference' / 'machines.md'
 
 
 @pytest.mark.parametrize('name', list(MACHINES))

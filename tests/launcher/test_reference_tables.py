@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import subprocess
 import sys
@@ -18,6 +19,13 @@ from tests.launcher.conftest import ROOT
 
 pytestmark = pytest.mark.early
 
+
+COMMANDS = """
+import json
+from launcher.package_commands import HELP
+from launcher.reference_tables import cli_page
+print(cli_page(json.loads(HELP.read_text())))
+"""
 
 SURVEY = """
 import json, sys
@@ -73,3 +81,15 @@ def test_params_prints_each_value_with_its_source():
     assert lines['execution_mode'].endswith('"RANDOM"  (--mode RANDOM)')
     assert 'config/parameters.yaml:' in lines['random_battery_time']
     assert lines['console'].rstrip().endswith(')')
+
+
+def test_the_page_of_commands_is_what_they_say():
+    def said(text):
+        # From Python 3.13 on `-o PNG, --output PNG` is `-o, --output PNG`.
+        return re.sub(r'(-\w) [A-Z]+, --', r'\1, --', text).split()
+
+    words = [sys.executable, '-c', COMMANDS]
+    done = subprocess.run(words, cwd=ROOT, check=True, capture_output=True, text=True)
+    page = (ROOT / 'docs' / 'reference' / 'cli.md').read_text()
+    hint = 'write it anew: python3 launch.py params --write'
+    assert said(done.stdout) == said(page), hint

@@ -258,7 +258,7 @@ def test_a_text_that_no_mail_can_hold_goes_out_in_one_line(
 @pytest.mark.parametrize('kind', SINKS)
 def test_each_kind_of_sink_is_in_the_documents(kind: str) -> None:
     """A new kind is an entry of the table, and a row of the page that users read."""
-    text = (Path(__file__).parents[2] / 'docs' / 'how-to' / 'watch.md').read_text('utf-8')
+    text = (Path(__file__).parents[2] / 'docs' / 'how-to' / 'notify.md').read_text('utf-8')
     assert f'| {kind} |' in text
     assert all(key in text for key in SINKS[kind].keys if not key.endswith(('_env', '_file')))
 

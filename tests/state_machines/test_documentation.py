@@ -29,7 +29,7 @@ def run_blocks(name, kind='tutorial'):
 
 
 def test_the_tutorial_runs():
-    assert run_blocks('explanation/state_machines.md')[0] >= 10
+    assert run_blocks('how-to/state_machine.md')[0] >= 10
 
 
 def test_the_machine_that_came_from_yasmin_runs():

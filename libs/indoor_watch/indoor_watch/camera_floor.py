@@ -22,7 +22,8 @@ Mask = NDArray[np.bool_]
 BODY = np.linspace(0.1, 1.7, 9)
 """Heights of the parts of a body that stands, metres above the floor."""
 PART = 0.5
-"""So much of it is in the picture: of whom less is seen is mostly missed (docs/how-to/watch.md)."""
+"""So much of it is in the picture: persons of whom less is seen are mostly missed
+(docs/explanation/noticing.md)."""
 NEAREST = 0.3
 """The floor under the camera's own mount is in no picture, metres."""
 STEEPEST = 0.2

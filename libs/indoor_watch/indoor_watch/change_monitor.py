@@ -40,7 +40,7 @@ SET_BACK = 30.0
 LONGEST_STAND = 120.0
 """A robot that stands for longer begins another visit, seconds. A thing is told once it was met in
 three tenths of the sweeps of a visit: so within 40 s, however long the robot stands. A whole look,
-which takes 30 s (docs/how-to/watch.md), is not cut."""
+which takes 30 s (docs/explanation/noticing.md), is not cut."""
 
 
 class ChangeMonitor:

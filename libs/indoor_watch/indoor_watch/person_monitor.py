@@ -32,8 +32,8 @@ looks to four sides from the middle of a room shows 53 %; the confidence says ho
 LOOKED_SECONDS = 5.0
 """And for so long."""
 FOUND = 0.88
-"""Share of the persons in single photographs that are found (docs/how-to/watch.md): so sure are
-pictures of a whole floor that nobody is there."""
+"""Share of the persons in single photographs that are found (docs/explanation/noticing.md): so
+sure are pictures of a whole floor that nobody is there."""
 DOUBTED = 0.3
 """Confidence at most of whom the lidar sees through: below what a rule asks for."""
 UNSURE = 0.5

@@ -15,7 +15,7 @@ Secrets are never in it: a file or an environment variable holds them, and is re
 
 Each takes a notification or raises `DeliveryError`, without secrets in it. :data:`SINKS` has every
 kind: its keys in the file, how they are read, and how it is told. A new one is an entry there, and
-a row in `docs/how-to/watch.md`.
+a row in `docs/how-to/notify.md`.
 """
 
 from __future__ import annotations
