@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeAlias
 
+from armor_service.store.unique_names import ListWords, different_lists
 from owl_reasoner.documents.mapping import DECLARATIONS, RdfMapper
 from owl_reasoner.documents.rdf_xml import Graph, Node, Triple
 from owl_reasoner.documents.triples import KIND_TYPES, NODE, axiom_triples
@@ -443,13 +444,20 @@ class WorldOntology:
         self._kinds = self._declarations()
         self._places, self._undo = {}, []
         self._shared.clear()
+        words = self._list_words()
         found = AxiomsRead()
         rest: list[Quad] = []
-        for quad in execute(f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} ORDER BY rowid'):
+        kinds = ','.join(map(str, self._kind_types))
+        # Declarations are known by now, and links of lists are read by themselves.
+        query = (
+            f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} AND p NOT IN (?, ?) '
+            f'AND NOT (p=? AND s>0 AND o IN ({kinds})) ORDER BY rowid'
+        )
+        for quad in execute(query, (*words[-2:], words.type)):
             axiom = self._fact(quad)
             if axiom is None:
                 rest.append(quad)
-            elif axiom is not _DECLARES:
+            else:
                 found.added.append(axiom)
         for quad in execute(f'SELECT s, p, o, d FROM datas NOT INDEXED WHERE c={c} ORDER BY rowid'):
             axiom = self._fact(quad)
@@ -457,11 +465,29 @@ class WorldOntology:
                 rest.append(quad)
             else:
                 found.added.append(axiom)
+        links = execute(
+            f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} AND p IN (?, ?) ORDER BY rowid',
+            words[-2:],
+        )
+        lists, rest = different_lists(rest, links, words)
         others, found.problems = self._mapped(rest)
+        others += dict.fromkeys(self._different(*one) for one in lists)
         found.added = [*others, *found.added]
         found.added += [ax.Declaration(*entity) for entity in sorted(self._declared)]
         self._undo.clear()
         return found
+
+    def _list_words(self) -> ListWords:
+        find = self._names.find
+        members = frozenset((find(OWL + 'members'), find(OWL + 'distinctMembers')))
+        type_, nil, first, rest = (find(RDF + name) for name in ('type', 'nil', 'first', 'rest'))
+        return ListWords(type_, find(OWL + 'AllDifferent'), nil, members, first, rest)
+
+    def _different(self, members: list[int], nodes: tuple[int, ...]) -> Axiom:
+        axiom = ax.DifferentIndividuals(frozenset(map(self._names.name, members)))
+        before = self._places.get(axiom, AxiomQuads())
+        self._stand(axiom, AxiomQuads((*before.nodes, *nodes), before.quads))
+        return axiom
 
     def _declarations(self) -> dict[str, set[str]]:
         """Return as what each name is declared."""
