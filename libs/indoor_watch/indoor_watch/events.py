@@ -66,7 +66,7 @@ class Event:
         compared_with: What the last sighting was compared with; or empty.
         seen_from: Where the robot was at the first sighting, map frame, metres; None: not known.
         confirmed: Whether one sighting was sure, or it was seen from elsewhere or in another visit,
-            too.
+            too. Of a person whom the camera alone saw: from elsewhere.
         sensors: What saw it, of a person.
         first: The confidence of the first sighting.
         again: What confirmed it, and when; empty: nothing has, or one sighting was sure.
@@ -229,7 +229,7 @@ class EventBook:
                 evidence,
                 seen.compared_with,
                 seen.seen_from,
-                seen.confidence >= SURE,
+                seen.confidence >= SURE and not _by_camera_alone(seen.kind, (seen.sensor,)),
                 (seen.sensor,) if seen.sensor else (),
                 seen.confidence,
             )
@@ -242,8 +242,12 @@ class EventBook:
         new_visit = self._visits.get(event.number) != visit
         self._visits[event.number] = visit
         is_elsewhere = _from_elsewhere(event, seen)
-        how = 'in another visit' if event.looks + new_visit > 1 else 'from elsewhere'
-        is_again = (event.looks + new_visit > 1 or is_elsewhere) and not event.confirmed
+        how = 'from elsewhere' if is_elsewhere else 'in another visit'
+        sensors = tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ()))))
+        alone = _by_camera_alone(seen.kind, sensors)
+        # From where nobody knows, another visit has to do.
+        by_visit = not alone or event.seen_from is None
+        is_apart = is_elsewhere or (by_visit and event.looks + new_visit > 1)
         after = f'seen {how} after {max(0.0, seen.stamp - event.began):.0f} s'
         changed = replace(
             event,
@@ -259,12 +263,9 @@ class EventBook:
             robots=tuple(dict.fromkeys((*event.robots, seen.robot))),
             evidence=self._evidence(event, seen),
             compared_with=seen.compared_with or event.compared_with,
-            confirmed=event.confirmed
-            or seen.confidence >= SURE
-            or event.looks + new_visit > 1
-            or is_elsewhere,
-            again=after if is_again and not event.again else event.again,
-            sensors=tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ())))),
+            confirmed=event.confirmed or is_apart or (seen.confidence >= SURE and not alone),
+            again=after if is_apart and not (event.confirmed or event.again) else event.again,
+            sensors=sensors,
         )
         self._events[event.number] = changed
         if changed.state != EventState.OPEN:
@@ -495,6 +496,15 @@ def _from_elsewhere(event: Event, seen: Observation) -> bool:
     if event.seen_from is None or seen.seen_from is None:
         return False
     return math.dist(event.seen_from, seen.seen_from) >= ELSEWHERE
+
+
+def _by_camera_alone(kind: Kind, sensors: tuple[str, ...]) -> bool:
+    """Tell whether the camera alone saw a person.
+
+    What looks like one from here, as a coat or a picture on the wall, does so in each picture from
+    here, in whatever visit: a second look is from elsewhere then, or another sensor's.
+    """
+    return kind == Kind.PERSON and sensors == ('camera',)
 
 
 def _same(normal: Observation, seen: Observation) -> bool:

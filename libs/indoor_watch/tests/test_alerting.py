@@ -12,7 +12,7 @@ import pytest
 
 from indoor_watch import Event, EventBook, EvidenceStore, Kind, Observation, rule_from
 from indoor_watch.alerting import SENT_WITHIN, Alerting
-from indoor_watch.visit import Pictured, Visit
+from indoor_watch.visit import LidarSweep, Pictured, Visit
 
 BARE = np.full((40, 60), 90, np.uint8)
 
@@ -42,9 +42,18 @@ class Alerted:
         seen = Observation(Kind.DOOR, 'closed', 'R1', door, None, confidence, stamp)
         self.alerting.take([Pictured(seen, BARE)], Visit('R1', visit))
 
-    def see_person(self, stamp: float, visit: int = 1) -> None:
-        seen = Observation(Kind.PERSON, 'seen', 'E', '', None, 0.82, stamp, sensor='camera')
-        self.alerting.take([Pictured(seen, BARE)], Visit('E', visit))
+    def see_person(
+        self,
+        stamp: float,
+        visit: int = 1,
+        at: tuple[float, float] | None = None,
+        sure: float = 0.82,
+        sensor: str = 'camera',
+    ) -> None:
+        seen = Observation(Kind.PERSON, 'seen', 'E', '', None, sure, stamp, sensor=sensor)
+        nothing = np.zeros((0, 2)), np.zeros(0, np.bool_), stamp
+        sweep = None if at is None else LidarSweep(at, *nothing)
+        self.alerting.take([Pictured(seen, BARE)], Visit('E', visit, sweep=sweep))
 
     def files(self) -> set[str]:
         return {each.name for each in self.folder.iterdir()}
@@ -110,6 +119,26 @@ def test_a_person_in_one_picture_is_unverified_and_calls_nobody(tmp_path: Path) 
     assert (len(alerted.calls), len(alerted.warned)) == (0, 1), 'told once'
     alerted.see_person(100.0, visit=2)
     assert len(alerted.calls) == 1, 'the second look says so, too'
+
+
+def test_a_coat_that_looks_like_a_person_from_one_spot_calls_nobody(tmp_path: Path) -> None:
+    """It does so in each picture from there, also after hours at the dock."""
+    alerted = Alerted(tmp_path, verify_seconds=20.0)
+    for number in range(50):
+        alerted.see_person(10.0 * number, number // 12, (1.0, 2.0), 0.98)
+        alerted.alerting.doubts(10.0 * number)
+    assert (len(alerted.calls), len(alerted.warned)) == (0, 1)
+
+
+@pytest.mark.parametrize(('at', 'sensor'), [((1.6, 2.0), 'camera'), ((1.0, 2.0), 'lidar')])
+def test_a_person_who_is_seen_from_elsewhere_or_by_another_sensor_calls(
+    tmp_path: Path, at: tuple[float, float], sensor: str
+) -> None:
+    alerted = Alerted(tmp_path, verify_seconds=20.0)
+    alerted.see_person(1.0, 1, (1.0, 2.0))
+    assert not alerted.calls
+    alerted.see_person(5.0, 1, at, 0.96, sensor)
+    assert len(alerted.calls) == 1
 
 
 @pytest.mark.parametrize(('said', 'called', 'warned'), [('alert', 1, 0), ('warning', 0, 1)])
