@@ -235,6 +235,8 @@ class ChangeMonitor:
         camera: CameraView | None = None,
     ) -> None:
         """Take a picture; see `CameraShot` for the arguments."""
+        if camera is not None:
+            camera = self._registration.placed(camera, stamp)
         shot, visit = CameraShot(picture, viewpoint, stamp, markers, camera), self.visit
         visit.pictures += 1
         take, grey = self._alerting.take, grey_of(picture)

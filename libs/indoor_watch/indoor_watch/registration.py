@@ -11,11 +11,14 @@ misleads. From there on Gauss-Newton follows the signed distance to what stands 
 field: Thrun, Burgard and Fox, Probabilistic Robotics, chapter 6.4), with Cauchy weights, so that
 what is new does not pull. What the localisation says is the prior: along a bare corridor nothing
 else holds the sweep, and what is left of the doubt there goes with the sweep, into the slack of
-whoever compares.
+whoever compares. A camera on the robot has the same error, and is placed by the same correction:
+so are the markers that it reads, and the persons that it finds. Whole views need none of it: they
+are registered to each other in the picture (`views`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +27,7 @@ from scipy import ndimage
 
 from floor_plans.occupancy_grid import Grid, distance_to
 from indoor_watch.floor import FloorView
+from indoor_watch.hung_markers import CameraView
 from indoor_watch.visit import LidarSweep
 
 Array = NDArray[np.float64]
@@ -54,6 +58,9 @@ STEPS = (7, 13)
 """Of that grid, in each direction and in the heading: 7 cm and 0.7 degrees."""
 SEARCH_BEAMS = 120
 ITERATIONS = 6
+CAMERA_AFTER = 2.0
+"""A picture so long after a sweep, or before it, was taken with the same error, seconds: from one
+sweep to the next that changes by `JITTER` at most, and a lidar turns twice a second or more."""
 
 
 class Correction(NamedTuple):
@@ -103,6 +110,8 @@ class Registration:
     def __init__(self) -> None:
         self._field: _Field | None = None
         self._last: Correction | None = None
+        # Where the lidar was at the last correction, as the localisation said, and when.
+        self._origin, self._stamp = np.zeros(2), -np.inf
 
     def begin(self) -> None:
         """Take that a visit begins: its pose is off by something else, and more is known."""
@@ -130,12 +139,32 @@ class Registration:
         away = np.linalg.norm(sweep.points - origin, axis=1)
         rays = (sweep.points - origin)[(away < AROUND) & (away > 0.05)]
         found = self._correction(field, origin, rays, deviation, turn)
+        if self._last is not None:
+            self._origin, self._stamp = origin, sweep.stamp
         there, ends = moved(found, origin, sweep.ends)
         return sweep._replace(
             sensor=(float(there[0]), float(there[1])),
             ends=ends,
             doubt=_doubt_of(found, field, there, ends),
         )
+
+    def placed(self, camera: CameraView, stamp: float) -> CameraView:
+        """Return a camera where it is by the last sweep, with the doubt that it has.
+
+        Localisation tells lidar and camera with one error. How the robot's joints turn the camera
+        is in the doubt, which is not made less.
+
+        Args:
+            camera: As the localisation says.
+            stamp: Of the picture, seconds since 1970.
+        """
+        found = self._last
+        if found is None or abs(stamp - self._stamp) > CAMERA_AFTER:
+            return camera
+        pose = camera.pose.copy()
+        pose[:2, :3] = _turn(found.yaw) @ pose[:2, :3]
+        _, pose[:2, 3:] = (each.T for each in moved(found, self._origin, pose[:2, 3:].T))
+        return replace(camera, pose=pose)
 
     def _correction(
         self, field: _Field, origin: Array, rays: Array, deviation: float, turn: float
@@ -162,10 +191,13 @@ class Registration:
 
 def moved(correction: Correction, sensor: Array, points: Array) -> tuple[Array, Array]:
     """Return where the lidar was, (2,), and where its beams ended, (n, 2), once corrected."""
-    cosine, sine = np.cos(correction.yaw), np.sin(correction.yaw)
-    turn = np.array([[cosine, -sine], [sine, cosine]])
     there = sensor + np.array([correction.x, correction.y])
-    return there, (points - sensor) @ turn.T + there
+    return there, (points - sensor) @ _turn(correction.yaw).T + there
+
+
+def _turn(yaw: float) -> Array:
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    return np.array([[cosine, -sine], [sine, cosine]])
 
 
 def _doubt_of(correction: Correction, field: _Field, sensor: Array, ends: Array) -> Array:
@@ -209,8 +241,7 @@ def _searched(field: _Field, origin: Array, rays: Array, far: float, turn: float
     best, found = -1.0, np.zeros(3)
     height, width = field.distance.shape
     for yaw in np.linspace(-turn, turn, STEPS[1]):
-        cosine, sine = np.cos(yaw), np.sin(yaw)
-        turned = some @ np.array([[cosine, sine], [-sine, cosine]]) + origin - field.origin
+        turned = some @ _turn(yaw).T + origin - field.origin
         cells = ((turned[None] + across[:, None]) / field.resolution).astype(np.intp)
         columns, rows = np.clip(cells[..., 0], 0, width - 1), np.clip(cells[..., 1], 0, height - 1)
         away = field.distance[rows, columns]
@@ -230,8 +261,7 @@ def _refined(
     prior = np.linalg.inv(covariance)
     at, needed = start.copy(), prior
     for _ in range(ITERATIONS):
-        cosine, sine = np.cos(at[2]), np.sin(at[2])
-        turned = rays @ np.array([[cosine, sine], [-sine, cosine]])
+        turned = rays @ _turn(at[2]).T
         away, slope = field.at(origin + at[:2] + turned)
         near = np.abs(away) < REACH
         if near.sum() < LEAST_ENDS:

@@ -400,7 +400,7 @@ def test_markers_move_and_go_missing_only_where_their_spot_was_in_view():
     hung, there = hang(picture, 14, 140, 100), hang(moved, 14, 200, 100)
     other, at = wall(2), (1.0, 1.0, 0.5)
     watch.watcher.arrive('R1', 1.0)
-    watch.watcher.sweep((0.0, 0.0), *beams((0.1, 0.1)), 1.0)
+    watch.watcher.sweep((0.0, 0.0), *beams((0.1, 0.1)), -9.0)
     for number in range(3):
         watch.watcher.picture(picture, at, 1.0 + number, [hung], camera(y=1.0))
         watch.watcher.picture(other, at, 1.0 + number, [], camera(y=1.0, yaw=math.pi))

@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 
 from floor_plans import Grid
 from indoor_watch.floor import FloorView
+from indoor_watch.hung_markers import CameraView
 from indoor_watch.registration import Registration
 from indoor_watch.visit import LidarSweep
+
+from .marked_walls import camera_pose
 
 SIDE = 0.05
 HERE = (2.0, 1.5)
@@ -106,6 +109,27 @@ def test_with_too_few_ends_a_sweep_stays_and_its_doubt_is_that_of_the_localisati
     assert found.sensor == pytest.approx(few.sensor)
     assert found.doubt is not None
     assert found.doubt.max() > 0.15
+
+
+@given(errors, st.floats(-math.pi, math.pi))
+def test_a_camera_is_placed_by_the_same_correction(
+    off: tuple[float, float, float], bearing: float
+) -> None:
+    true = camera_pose(HERE[0] + 0.2, HERE[1] - 0.1, bearing, pitch=-0.1)
+    turn = np.eye(4)
+    turn[:2, :2] = [[math.cos(off[2]), -math.sin(off[2])], [math.sin(off[2]), math.cos(off[2])]]
+    told = turn @ true
+    told[:2, 3] = turn[:2, :2] @ (true[:2, 3] - HERE) + HERE + off[:2]
+    registration = Registration()
+    camera = CameraView(told, np.eye(3), 0.03, 0.02)
+    assert registration.placed(camera, 1.0) is camera, 'no sweep yet'
+    registration.registered(swept(off)[0], hall(), None)
+    placed = registration.placed(camera, 1.5)
+    assert np.abs(placed.pose - true).max() < 0.03
+    assert (placed.deviation, placed.turn) == (0.03, 0.02)
+    assert registration.placed(camera, 60.0) is camera, 'the robot may be anywhere since'
+    registration.begin()
+    assert registration.placed(camera, 1.5) is camera
 
 
 def test_a_map_without_walls_holds_nothing() -> None:
