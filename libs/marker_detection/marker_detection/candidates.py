@@ -71,11 +71,13 @@ class Mask(NamedTuple):
         pixels: (height, width) not 0 where it is dark.
         scale: Factor by which it is smaller than the image.
         eroded: Pixels that were taken from the edge of every blob.
+        bridged: Whether gaps were closed in it.
     """
 
     pixels: Grey
     scale: int = 1
     eroded: int = 0
+    bridged: bool = False
 
 
 def dark_masks(
@@ -129,7 +131,7 @@ def dark_masks(
         for dark in full_size:
             for shape in ((length, 1), (1, length)):
                 closed = cv2.morphologyEx(dark, cv2.MORPH_CLOSE, np.ones(shape, np.uint8))
-                yield Mask(_bytes(closed))
+                yield Mask(_bytes(closed), bridged=True)
 
 
 def _bytes(image: npt.NDArray[Any]) -> Grey:
@@ -156,6 +158,7 @@ def quads_around(
     *,
     min_length: float = 8.0,
     limit: float = math.inf,
+    crowd: float = math.inf,
 ) -> Quads:
     """Quadrilaterals around the blobs of masks.
 
@@ -164,17 +167,19 @@ def quads_around(
         min_length: Longer side in pixels of the smallest blob's upright box.
         limit: Once so many blobs were looked at, in the first mask or in all others, only those
             with a parallelogram's moments are; after the others, no further mask.
+        crowd: Once so many were, no gaps are bridged: in clutter at VGA that takes a third of the
+            time, and finds one more of 120 markers at 55 to 82 degrees.
 
     Returns:
         (n, 4, 2) corners in pixels, clockwise as seen.
     """
     found: list[Quads] = []
     seen: set[bytes] = set()
-    for order, (mask, scale, eroded) in enumerate(masks):
+    for order, (mask, scale, eroded, bridged) in enumerate(masks):
         # the first mask is of black alone: what it shows is no reason to look at less elsewhere
         if order == 1:
             seen.clear()
-        if len(seen) > limit:
+        if len(seen) > (min(limit, crowd) if bridged else limit):
             break
         blobs = _blobs_in(mask, min_length / scale, _LEAST_WIDTH)
         if blobs is None:

@@ -83,7 +83,8 @@ class DetectorSettings:
         windows: Sides in pixels of the neighbourhoods a border is compared with, odd, in the order
             in which they are tried. Only a small one parts a thin border from what lies beyond its
             margin; in a crowd on a large image it sees so many outlines that it comes last.
-        bridges: Gaps in pixels that are closed for markers seen at a flat angle.
+        bridges: Gaps in pixels that are closed for markers seen at a flat angle, where there are
+            no more than `max_outlines` in an image of whatever size.
         max_outlines: Dark outlines in an image of two megapixels after which only those near
             quadrilaterals are looked at, and no further neighbourhood or bridge is tried; in a
             smaller one as many more as it has fewer pixels.
@@ -281,7 +282,9 @@ class MarkerDetector:
         )
         # a smaller image has the same work to spare, not more outlines that are clutter
         limit = settings.max_outlines * max(1.0, _FULL_WORK / prepared.grey.size)
-        quads = quads_around(masks, min_length=settings.min_length, limit=limit)
+        quads = quads_around(
+            masks, min_length=settings.min_length, limit=limit, crowd=settings.max_outlines
+        )
         correlation = self._border.correlation(pyramid, homographies_of(quads), contrast)
         passed = correlation > 0.0
         quads, correlation = quads[passed], correlation[passed]

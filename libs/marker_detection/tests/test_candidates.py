@@ -198,3 +198,15 @@ def test_the_correlation_is_that_of_two_levels_with_noise_around_them():
     # contrast / sqrt(contrast^2 + 4 variance); halving the image once leaves a quarter of it,
     # interpolation about half
     assert found == pytest.approx(80.0 / np.sqrt(80.0**2 + 4.0 * 40.0**2 / 4.0 * 0.45), abs=0.06)
+
+
+@pytest.mark.parametrize(('crowd', 'found'), [(1, 1), (2, 2)])
+def test_gaps_are_bridged_unless_there_is_a_crowd(crowd: int, found: int) -> None:
+    """Of the second mask every other blob would be one of the first, joined to its neighbours."""
+    first, second = (np.zeros((100, 200), np.uint8) for _ in range(2))
+    cv2.rectangle(first, (10, 10), (40, 40), 255, -1)
+    cv2.rectangle(first, (60, 60), (64, 64), 255, -1)
+    cv2.rectangle(second, (120, 20), (160, 60), 255, -1)
+    masks = [Mask(np.zeros_like(first)), Mask(first), Mask(second, bridged=True)]
+    large = quads_around(masks, min_length=5.0, crowd=crowd)
+    assert len([each for each in large if np.ptp(each[:, 0]) > 20]) == found
