@@ -5,7 +5,9 @@
 
 The pages are those of `docs/`, each library's README, the examples, and a reference of every public
 module, made by mkdocstrings from the docstrings. Links between them that would leave the site in a
-checkout are turned to the page that they mean. `--strict` makes a link that leads nowhere an error.
+checkout are turned to the page that they mean. `--strict` makes a link or an anchor that leads
+nowhere an error. The site loads nothing from other hosts: the script that draws comes from the npm
+package mermaid at build time. `codespell` reads what people wrote.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import venv
 from pathlib import Path
 
@@ -24,7 +27,16 @@ sys.path.insert(0, str(CHECKOUT))
 from launcher.environment import LIBRARIES, PACKAGES  # noqa: E402
 
 SITE = CHECKOUT / 'build' / 'site'
-TOOLS = ['mkdocs-material>=9.5,<10', 'mkdocstrings[python]>=0.26,<2']
+TOOLS = ['mkdocs-material>=9.5,<10', 'mkdocstrings[python]>=0.26,<2', 'codespell>=2.4,<3']
+DRAWING = 'mermaid@11.4.1'
+"""The npm package of the script that draws."""
+
+KNOWN = 'mot,ot,ist,leaved,ser'
+"""What codespell takes for a mistake and is none."""
+
+FOUND_FIRST = {'how-to': 4.0, 'tutorial': 3.0, 'reference': 1.5, 'api': 0.3, 'project': 0.5}
+"""How much a folder's pages count in the search; else 1."""
+
 SECTIONS = {
     'Start': ('tutorial',),
     'How to': ('how-to',),
@@ -42,7 +54,7 @@ use_directory_urls: false
 theme:
   name: material
   font: false
-  features: [navigation.sections, navigation.top, toc.follow]
+  features: [navigation.sections, navigation.top, toc.follow, search.highlight]
   palette:
     - media: '(prefers-color-scheme: light)'
       scheme: default
@@ -73,7 +85,8 @@ markdown_extensions:
 validation:
   links:
     not_found: warn
-    anchors: info
+    anchors: warn
+extra_javascript: [{scripts}]
 nav:
 {nav}
 """
@@ -85,13 +98,18 @@ def main() -> int:
     pages = SITE / 'pages'
     moved = gather(pages)
     reference(pages)
+    scripts = drawing_script(pages)
     for path in pages.rglob('*.md'):
         text = path.read_text(encoding='utf-8')
-        path.write_text(relinked(text, path.relative_to(pages), moved), encoding='utf-8')
+        text = relinked(text, path.relative_to(pages), moved)
+        counts = FOUND_FIRST.get(path.parent.name)
+        if counts is not None:
+            text = f'---\nsearch:\n  boost: {counts}\n---\n\n{text}'
+        path.write_text(text, encoding='utf-8')
     paths = ', '.join(
         str(CHECKOUT / folder) for folder in (*(f'libs/{name}' for name in LIBRARIES), *PACKAGES)
     )
-    config = CONFIG.format(paths=paths, nav=navigation(pages))
+    config = CONFIG.format(paths=paths, nav=navigation(pages), scripts=', '.join(scripts))
     (SITE / 'mkdocs.yml').write_text(config, encoding='utf-8')
     python = SITE / 'venv' / 'bin' / 'python'
     if not python.exists():
@@ -101,9 +119,47 @@ def main() -> int:
     build = [str(python), '-m', 'mkdocs', 'build', '--strict', '-q', '-f', str(SITE / 'mkdocs.yml')]
     environ = {**os.environ, 'NO_MKDOCS_2_WARNING': '1', 'DISABLE_MKDOCS_2_WARNING': 'true'}
     code = subprocess.run(build, env=environ, check=False).returncode
+    code = code or spelled(SITE / 'venv' / 'bin' / 'codespell') or foreign(SITE / 'html')
     if code == 0:
         print(f'the site is in {SITE / "html"}: {len(list((SITE / "html").rglob("*.html")))} pages')
     return code
+
+
+def drawing_script(pages: Path) -> list[str]:
+    """Put the script that draws beside the pages; none where npm is not there."""
+    if shutil.which('npm') is None:
+        print('no npm: drawings are shown as text')
+        return []
+    folder = SITE / 'npm'
+    folder.mkdir(parents=True, exist_ok=True)
+    archive = folder / f'{DRAWING.replace("@", "-")}.tgz'
+    if not archive.exists():
+        subprocess.run(['npm', 'pack', '--silent', DRAWING], cwd=folder, check=True)
+    (pages / 'scripts').mkdir(parents=True, exist_ok=True)
+    with tarfile.open(archive) as files:
+        script = files.extractfile('package/dist/mermaid.min.js')
+        assert script is not None
+        (pages / 'scripts' / 'mermaid.min.js').write_bytes(script.read())
+    return ['scripts/mermaid.min.js']
+
+
+def spelled(codespell: Path) -> int:
+    """Return 0 if no word of the pages is a common misspelling."""
+    words = [str(codespell), '-L', KNOWN, '--skip', '*.svg,*.png,*.gif,*.jpg,*.py']
+    return subprocess.run(
+        [*words, 'docs', 'README.md', 'CONTRIBUTING.md', 'SECURITY.md'], cwd=CHECKOUT, check=False
+    ).returncode
+
+
+def foreign(html: Path) -> int:
+    """Return 0 if no page loads a script, style, picture or font of another host."""
+    loads = re.compile(
+        r'<(?:script|img|iframe|source)[^>]*\ssrc="?(https?:)?//|<link[^>]*rel="?stylesheet[^>]*https?://'
+    )
+    found = [path for path in html.rglob('*.html') if loads.search(path.read_text('utf-8'))]
+    for path in found:
+        print(f'{path}: loads from another host')
+    return int(bool(found))
 
 
 def gather(pages: Path) -> dict[str, str]:
