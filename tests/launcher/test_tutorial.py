@@ -22,8 +22,8 @@ from libs.floor_plans.tests.test_rmf_building import building, level
 from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
 
 PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
-ELSEWHERE = ('git clone', 'python3 launch.py\n', 'benchmarks/')
-"""Commands that other tests run: a clone, a mission without end, a benchmark."""
+ELSEWHERE = ('git clone', 'python3 launch.py\n', 'launch.py --web\n', 'benchmarks/')
+"""Commands that other tests run: a clone, a mission without end, a page, a benchmark."""
 
 AS_FAST_AS_NODES = ('--for', '600', '-p', 'speed:=0.0', '-p', 'camera.rate:=1.0', '--domain')
 """Time waits for the nodes, for which ten times real time may be too fast on a busy machine; and a
