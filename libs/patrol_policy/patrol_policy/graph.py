@@ -11,12 +11,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from patrol_policy.tour import (
+    DENSE_UP_TO,
     EXACT_UP_TO,
     Tour,
     shortest_tour,
@@ -26,8 +27,6 @@ from patrol_policy.tour import (
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-DENSE_UP_TO = 128
-"""Up to so many places the shortest ways are computed without scipy, whose import takes longer."""
 ALL_PAIRS_UP_TO = 600
 """Up to so many places the shortest ways between all pairs are kept. On larger maps they are found
 when they are asked for, so that memory grows with the ways and not with the pairs."""
@@ -270,14 +269,7 @@ class PatrolGraph:
             raise GraphError('no tour leads through all places: the map is not connected')
         if len(self.places) <= EXACT_UP_TO:
             return shortest_tour(self.distances)
-        import networkx
-
-        network: networkx.Graph[int] = networkx.Graph()
-        network.add_nodes_from(range(len(self.places)))
-        network.add_edges_from((place, other) for place in network for other in self.ways[place])
-        found: Any = networkx.biconnected_components(network)
-        blocks: list[list[int]] = [sorted(block) for block in found]
-        return tour_over_blocks(self.ways, sorted(blocks))
+        return tour_over_blocks(self.ways, biconnected_blocks(self.ways))
 
     @cached_property
     def walk(self) -> tuple[str, ...]:
@@ -289,6 +281,51 @@ class PatrolGraph:
         for start, goal in zip(order, [*order[1:], order[0]], strict=True):
             steps.extend(self.route(start, goal))
         return tuple(steps)
+
+
+def biconnected_blocks(ways: Sequence[Iterable[int]]) -> list[list[int]]:
+    """Return the blocks of a graph: places that stay connected whichever of them is taken away.
+
+    By one depth-first walk (Hopcroft and Tarjan, Algorithm 447, Communications of the ACM, 1973).
+
+    Args:
+        ways: Where a way leads from each place; its direction does not count.
+    """
+    joined: list[set[int]] = [set() for _ in ways]
+    for place, others in enumerate(ways):
+        for other in others:
+            joined[place].add(other)
+            joined[other].add(place)
+    number: dict[int, int] = {}
+    lowest: dict[int, int] = {}
+    blocks = []
+    for root in range(len(ways)):
+        if root in number:
+            continue
+        number[root] = lowest[root] = len(number)
+        walk, waiting = [(root, root, iter(joined[root]))], [root]
+        while walk:
+            place, above, beside = walk[-1]
+            for other in beside:
+                if other not in number:
+                    number[other] = lowest[other] = len(number)
+                    waiting.append(other)
+                    walk.append((other, place, iter(joined[other])))
+                    break
+                if other != above:
+                    lowest[place] = min(lowest[place], number[other])
+            else:
+                walk.pop()
+                if place == root:
+                    continue
+                lowest[above] = min(lowest[above], lowest[place])
+                if lowest[place] >= number[above]:
+                    # Nothing below leads past the place above: a block ends there.
+                    block = [above]
+                    while block[-1] != place:
+                        block.append(waiting.pop())
+                    blocks.append(sorted(block))
+    return sorted(blocks)
 
 
 def graph_of_places(

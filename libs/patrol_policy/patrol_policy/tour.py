@@ -26,6 +26,8 @@ Matrix = NDArray[np.float64]
 
 EXACT_UP_TO = 12
 """The largest number of places for which the exact tour is computed, by dynamic programming."""
+DENSE_UP_TO = 128
+"""Up to so many places the shortest ways are computed without scipy, whose import takes longer."""
 NEIGHBOURS = 12
 """How many nearest places each place is tried beside when a tour is improved."""
 ASCENT_STEPS = 150
@@ -125,7 +127,7 @@ def _tour_of_block(ways: Sequence[Mapping[int, float]], members: Sequence[int]) 
     for row, others in enumerate(inner):
         legs[row, list(others)] = list(others.values())
     np.fill_diagonal(legs, 0.0)
-    if len(members) <= EXACT_UP_TO:
+    if len(members) <= DENSE_UP_TO:
         # Floyd and Warshall: faster than a start of SciPy for so few.
         for middle in range(len(members)):
             np.minimum(legs, legs[:, middle, None] + legs[middle], out=legs)

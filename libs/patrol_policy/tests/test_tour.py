@@ -12,9 +12,11 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from patrol_policy.graph import PatrolGraph, graph_of_places
+from patrol_policy.graph import PatrolGraph, biconnected_blocks, graph_of_places
 from patrol_policy.tour import (
     Tour,
     _Improvement,
@@ -378,3 +380,11 @@ def test_places_come_nearest_first_as_far_as_is_asked() -> None:
     assert rows[16][3] == rows[3][16], 'the way back is not looked for'
     assert math.isinf(rows[0].find(19, 3))
     assert rows[0].find(1, 3) == pytest.approx(graph.distances[0][1])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30), st.floats(0.0, 0.4))
+def test_blocks_are_those_of_networkx(seed: int, count: int, share: float) -> None:
+    network: Any = nx.gnp_random_graph(count, share, seed=seed)
+    ways = [list(network[place]) for place in range(count)]
+    expected = sorted(sorted(block) for block in nx.biconnected_components(network))
+    assert biconnected_blocks(ways) == expected
