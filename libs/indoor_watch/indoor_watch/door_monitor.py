@@ -20,6 +20,7 @@ DOOR_RANGE = 6.0
 READINGS = 5
 """A door's state is that of most of so many readings, of which `AGREEING` must agree."""
 AGREEING = 4
+"""So one sweep through which somebody walks changes nothing."""
 BESIDE = 0.3
 """A point so far from a door is in the place on its side, metres."""
 

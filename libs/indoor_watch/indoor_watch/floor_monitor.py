@@ -38,6 +38,7 @@ Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FEWEST_SWEEPS = 5
+"""With fewer nothing is compared: who walks by is in most of them."""
 SAME_THING = 0.4
 """Two assessments mean one thing up to here, metres."""
 SPOT, SPOT_FREE = 0.15, 0.8

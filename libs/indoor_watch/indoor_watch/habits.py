@@ -28,6 +28,7 @@ FEWEST_VISITS, FEWEST_SECONDS = 40, 3 * 86_400.0
 UNUSUAL_BELOW = 0.1
 """Probability below which a state is unusual for its hour."""
 MOST_MODELS = 1000
+"""Bounds the memory: of doors and places of one building there are fewer."""
 
 
 @dataclass

@@ -38,7 +38,10 @@ FURTHER = 0.25
 MISSED = 1.0
 """Log odds that a picture without a find takes away."""
 MOST_ODDS = 6.0
+"""Log odds at most, of 0.9975: a track that is wrong is doubtful again after six pictures that
+show nobody."""
 MOST_TRACKS = 100
+"""Bounds the memory, and the work of the assignment."""
 
 
 @dataclass

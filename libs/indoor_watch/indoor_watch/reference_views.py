@@ -27,6 +27,7 @@ Viewpoint = tuple[float, ...]
 SAME_VIEW = (0.15, 0.1)
 """Viewpoints are the same within this: x and y in metres, any angle in radians."""
 MOST_VIEWS = 100
+"""Bounds memory and disk: five viewpoints of a place, or its doors' states, of twenty places."""
 
 
 @dataclass

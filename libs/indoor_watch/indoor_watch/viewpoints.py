@@ -29,10 +29,13 @@ ENOUGH = 0.95
 LEAST_GAIN = 0.04
 """A viewpoint that adds less, as a part of the floor, is left out."""
 MOST_VIEWPOINTS = 4
+"""Beside a room's own point: more there is no time for in a stay."""
 SPACING = 0.6
 """Between candidates, metres."""
 MOST_CANDIDATES = 40
+"""Bounds the work in a hall: the candidates are spaced wider until they are so few."""
 BEAMS = 240
+"""Of what a candidate sees: at `RANGE` they are 16 cm apart, less than a thing's side."""
 CHECK_WEIGHT = 0.1
 """A check of this room weighs as much as this part of its floor."""
 CHECK_RANGE = 3.0

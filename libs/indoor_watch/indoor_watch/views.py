@@ -39,7 +39,10 @@ Floats = npt.NDArray[np.float32]
 WIDTH = 480
 """Pictures are compared at this width, pixels."""
 LEAST_INLIERS = 20
+"""Points that fit one homography, without which pictures are not compared: it takes four, and by
+chance a few more."""
 LEAST_INLIER_SHARE = 0.25
+"""And their part of all matches: what moved or repeats has the others."""
 WINDOW = 15
 """Side of a compared window, pixels."""
 CORRELATED = 0.35
