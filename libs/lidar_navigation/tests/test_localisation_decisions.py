@@ -13,8 +13,7 @@ import pytest
 from floor_plans import Grid
 from lidar_navigation import Localiser
 from lidar_navigation.geometry import Pose, Scan
-from lidar_navigation.localisation import localisation
-from lidar_navigation.localisation.localisation import _Rival
+from lidar_navigation.localisation.belief import Rival
 from lidar_navigation.localisation.pose_search import _apart, _overlap
 
 HERE = (5.0, 5.0, 0.0)
@@ -48,7 +47,14 @@ class Told(Localiser):
         return [(pose, self._told(share)) for pose, share in self.finds]
 
     def _told(self, share: float) -> Any:
-        return SimpleNamespace(fit=share, hit=share, refutes=self.refutes)
+        likelihood = -24.0 * (1.0 - share)
+        return SimpleNamespace(
+            fit=share,
+            hit=share,
+            refutes=self.refutes,
+            log_likelihood=likelihood,
+            blank_likelihood=likelihood,
+        )
 
     def agrees(self, share: float, now: float) -> None:
         """See a scan of which every pose explains so much."""
@@ -97,7 +103,7 @@ def test_what_is_usual_follows_what_is_seen_slowly_up_and_more_slowly_down() -> 
 
 def test_doubtful_scans_are_looked_into_after_a_while_and_what_is_no_better_is_borne() -> None:
     localiser = Told()
-    localiser.finds = [(CLOSE, 0.79)]
+    localiser.finds = [(CLOSE, 0.71)]
     for now, searches in ((0.0, 0), (0.1, 0), (0.199, 0)):
         localiser.agrees(0.7, now)
         assert (localiser.searches, localiser.certain) == (searches, False)
@@ -118,143 +124,43 @@ def test_doubtful_scans_are_looked_into_after_a_while_and_what_is_no_better_is_b
     assert not localiser.certain, 'a scan that fits ends what is borne'
 
 
-def test_a_better_pose_that_a_push_explains_is_taken_at_once() -> None:
-    localiser = Told()
-    localiser.finds = [(CLOSE, 0.8), (FAR, 0.75), (APART, 0.69), ((5.7, 5.1, 0.1), 0.8)]
-    localiser.agrees(0.7, 0.0)
-    localiser.agrees(0.7, 0.2)
-    assert localiser.pose == CLOSE
-    assert (localiser.jumps, localiser.agreement) == (1, 0.8)
-    assert localiser.certain
-    # Where it was, and what explains about as much and is not the same place.
-    assert [(each.pose, each.is_equal) for each in localiser._rivals] == [(HERE, True), (FAR, True)]
-    assert [each.lead for each in localiser._rivals] == pytest.approx([-0.1, 0.0])
-    assert localiser.alike == [HERE, FAR]
-    assert localiser.ambiguous
-
-
-@pytest.mark.parametrize(
-    ('pose', 'explained', 'taken'),
-    [
-        ((5.99, 5.0, 0.79), 0.81, True),
-        ((5.0, 3.99, 0.0), 0.95, False),
-        ((5.5, 5.0, 0.81), 0.95, False),
-        ((5.5, 5.0, 0.0), 0.79, False),
-    ],
-)
-def test_what_counts_as_a_push(pose: Pose, explained: float, taken: bool) -> None:
-    localiser = Told()
-    localiser.finds = [(pose, explained)]
-    localiser.agrees(0.7, 0.0)
-    localiser.agrees(0.7, 0.2)
-    assert (localiser.pose == pose) is taken
-    assert localiser.jumps == int(taken)
-
-
-@pytest.mark.parametrize(
-    ('pose', 'explained', 'followed'),
-    [
-        (APART, 0.81, True),
-        (APART, 0.79, False),
-        ((5.0, 7.49, 0.0), 0.81, True),
-        ((5.0, 7.51, 0.0), 0.81, False),
-        (FAR, 0.91, True),
-        (FAR, 0.89, False),
-    ],
-)
-def test_a_pose_farther_away_is_followed_when_it_explains_much_more(
-    pose: Pose, explained: float, followed: bool
-) -> None:
-    localiser = Told()
-    localiser.finds = [(pose, explained)]
-    localiser.agrees(0.7, 0.0)
-    localiser.agrees(0.7, 0.2)
-    assert localiser.pose == HERE
-    assert localiser.certain is not followed
-    rivals = [(each.pose, each.is_equal) for each in localiser._rivals]
-    assert rivals == ([(pose, False)] if followed else [])
-    if followed:
-        assert localiser._rivals[0].lead == pytest.approx((explained - 0.7) / 3)
-
-
-def test_with_a_pose_that_is_followed_go_those_that_look_alike_but_no_more_than_are_kept(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    localiser = Told()
-    others = [((2.0 * number + 1.0, 19.0, 0.0), 0.91) for number in range(9)]
-    localiser.finds = [
-        (FAR, 0.95),
-        ((15.3, 15.0, 0.3), 0.95),
-        *others,
-        ((1.0, 17.0, 0.0), 0.89),
-    ]
-    localiser.agrees(0.7, 0.0)
-    localiser.agrees(0.7, 0.2)
-    assert [each.pose for each in localiser._rivals] == [FAR, *(pose for pose, _ in others)]
-    monkeypatch.setattr(localisation, 'MOST', 3)
-    few = Told()
-    few.finds = list(localiser.finds)
-    few.agrees(0.7, 0.0)
-    few.agrees(0.7, 0.2)
-    assert [each.pose for each in few._rivals] == [FAR, others[0][0]]
-
-
-def test_after_some_searches_without_a_winner_the_pose_is_kept() -> None:
-    localiser = Told()
-    localiser.finds = [(FAR, 0.95)]
-    localiser.worth = lambda pose: 0.7
-    now, rounds = 0.0, 0
-    localiser.see(SCAN, now)
-    while not localiser.certain:
-        now += 0.2
-        localiser._rivals.clear()
-        localiser.see(SCAN, now)
-        rounds += 1
-        assert rounds < 20
-    assert rounds == localiser.parameters.rounds + 1
-    assert localiser.searches == rounds
-    assert (localiser.pose, localiser.jumps) == (HERE, 0)
-
-
-def test_while_a_rival_leads_nothing_is_searched_for_some_scans() -> None:
-    localiser = Told()
-    localiser._rivals.append(_Rival(FAR, 0.3, is_equal=False))
-    localiser.worth = lambda pose: 0.7
-    for step in range(7):
-        localiser.see(SCAN, 0.2 * step)
-    assert localiser.searches == 1
-    localiser = Told()
-    localiser._rivals.append(_Rival(FAR, 0.0, is_equal=False))
-    localiser.worth = lambda pose: 0.7
-    localiser.see(SCAN, 0.0)
-    localiser.see(SCAN, 0.2)
-    assert localiser.searches == 1, 'one that does not lead holds up nothing'
-
-
 def test_a_lost_robot_searches_once_a_second_and_is_found_where_much_fits() -> None:
     localiser = Told()
-    localiser.finds = [(CLOSE, 0.5)]
+    localiser.finds = [(CLOSE, 0.3)]
     for now, searches in ((0.0, 1), (0.1, 1), (0.9, 1), (1.0, 2), (1.9, 2), (2.0, 3)):
         localiser.agrees(0.3, now)
         assert localiser.searches == searches
         assert localiser.lost
-    localiser.finds = [(CLOSE, 0.56)]
-    localiser.agrees(0.3, 3.0)
+    localiser.worth = lambda pose: 0.96 if pose == CLOSE else 0.3
+    localiser.finds = [(CLOSE, 0.96)]
+    localiser.see(SCAN, 3.0)
     assert (localiser.pose, localiser.lost, localiser.jumps) == (CLOSE, False, 1)
     assert localiser.state == (True, True, False)
+    assert localiser.ambiguous, 'one scan is not enough'
+    localiser.see(SCAN, 3.5)
+    assert (localiser.searches, localiser.ambiguous) == (4, False), 'it looked for others'
 
 
-def test_a_robot_that_fits_again_after_nothing_fitted_looks_whether_places_look_alike() -> None:
+def test_a_lost_robot_that_fits_in_two_places_is_not_sure_until_one_is_ruled_out() -> None:
     localiser = Told()
     localiser.agrees(0.3, 0.0)
     assert localiser.lost
-    localiser.finds = [(CLOSE, 0.9), (FAR, 0.86), ((1.0, 1.0, 0.0), 0.79)]
-    localiser.agrees(0.9, 0.1)
-    assert not localiser.lost
-    assert localiser.searches == localiser.warnings == 2
-    assert localiser.alike == [CLOSE, FAR]
-    localiser.agrees(0.9, 1.0)
-    assert localiser.searches == 2, 'once'
+    localiser.worth = lambda pose: 0.9 if math.dist(pose[:2], HERE[:2]) > 1.0 else 0.3
+    localiser.finds = [(FAR, 0.92), (APART, 0.9)]
+    localiser.see(SCAN, 1.0)
+    assert localiser.pose == FAR
+    assert (localiser.lost, localiser.alike) == (False, [APART])
+    for step in range(2, 12):
+        moved(localiser, 0.0)
+        localiser.see(SCAN, float(step))
+        assert localiser.ambiguous, 'neither explains more'
+    localiser.worth = lambda pose: 0.9 if pose[0] > 10.0 else 0.7
+    localiser.finds = []
+    for step in range(12, 20):
+        moved(localiser, 0.2)
+        localiser.see(SCAN, float(step))
+    assert localiser.pose[0] > 10.0
+    assert not localiser.ambiguous
 
 
 def moved(localiser: Told, way: float, turn: float = 0.0) -> None:
@@ -262,90 +168,38 @@ def moved(localiser: Told, way: float, turn: float = 0.0) -> None:
     localiser.move((way, 0.0, turn))
 
 
-@pytest.mark.parametrize(
-    ('way', 'turn', 'present', 'rival', 'equal', 'lead'),
-    [
-        # It moves: the difference counts, and a tenth of the sum is forgotten.
-        (0.08, 0.0, 0.9, 1.0, True, 0.2 - 0.02 + 0.1),
-        (0.0, 0.08, 0.9, 1.0, True, 0.2 - 0.02 + 0.1),
-        (0.08, 0.0, 1.0, 0.9, True, 0.2 - 0.02 - 0.1),
-        # What may be chance changes nothing.
-        (0.08, 0.0, 0.9, 0.949, True, 0.2),
-        # A challenger pays with each scan that the present pose explains.
-        (0.08, 0.0, 0.9, 1.0, False, 0.2 - 0.02 + 0.1 - 0.05),
-        (0.08, 0.0, 0.8, 0.9, False, 0.2 - 0.02 + 0.1),
-        # It stands: only much counts, and less.
-        (0.07, 0.07, 0.9, 1.0, True, 0.2),
-        (0.0, 0.0, 0.75, 1.0, False, 0.2 - 0.02 + 0.7 * 0.25),
-        (0.0, 0.0, 1.0, 0.75, True, 0.2 - 0.02 - 0.7 * 0.25),
-    ],
-)
-def test_what_a_scan_says_of_a_rival_is_summed(
-    way: float, turn: float, present: float, rival: float, equal: bool, lead: float
-) -> None:
+def test_before_one_that_a_robot_was_carried_to_is_taken_the_robot_says_that_it_is_not_sure() -> (
+    None
+):
     localiser = Told()
-    localiser._rivals.append(_Rival(FAR, 0.2, is_equal=equal))
-    localiser.worth = lambda pose: rival if pose[0] > 10.0 else present
-    moved(localiser, way, turn)
-    localiser.see(SCAN, 0.0)
-    assert [each.lead for each in localiser._rivals] == pytest.approx([lead])
-    assert localiser._rivals[0].pose == pytest.approx((15.0 + way, 15.0, turn))
-    assert localiser.pose == pytest.approx((5.0 + way, 5.0, turn))
+    localiser.finds = [(FAR, 0.9)]
+    localiser.worth = lambda pose: 0.9 if pose[0] > 10.0 else 0.7
+    doubts = []
+    for step in range(30):
+        moved(localiser, 0.05)
+        localiser.see(SCAN, 0.3 * step)
+        if localiser.jumps:
+            break
+        doubts.append(localiser.ambiguous)
+    assert localiser.jumps == 1
+    assert not doubts[0]
+    assert doubts[-1]
 
 
-def test_the_rival_that_leads_most_wins_and_the_present_pose_becomes_a_rival() -> None:
-    localiser = Told()
-    second = (2.0, 18.0, 0.0)
-    localiser._rivals += [_Rival(FAR, 0.31), _Rival(second, 0.35), _Rival((18.0, 2.0, 0.0), -0.2)]
-    localiser.worth = lambda pose: 0.9
-    localiser.see(SCAN, 0.0)
-    assert (localiser.pose, localiser.jumps) == (second, 1)
-    assert [each.pose for each in localiser._rivals] == [FAR, (18.0, 2.0, 0.0), HERE]
-    assert [each.lead for each in localiser._rivals] == pytest.approx([-0.04, -0.2, 0.0])
-    assert all(each.is_equal for each in localiser._rivals)
-
-
-@pytest.mark.parametrize(
-    ('lead', 'equal', 'present', 'wins'),
-    [
-        (0.301, True, 0.9, True),
-        (0.29, True, 0.9, False),
-        (0.8, False, 0.7, True),
-        (0.79, False, 0.7, False),
-        (0.9, False, 0.9, False),
-    ],
-)
-def test_a_rival_wins_with_a_lead_that_depends_on_how_likely_it_was(
-    lead: float, equal: bool, present: float, wins: bool
-) -> None:
-    localiser = Told()
-    localiser._rivals.append(_Rival(FAR, lead, is_equal=equal))
-    localiser.worth = lambda pose: present
-    localiser.see(SCAN, 0.0)
-    assert localiser.jumps == int(wins)
-    assert localiser.pose == (FAR if wins else HERE)
-    assert [each.pose for each in localiser._rivals] == [HERE if wins else FAR]
-    assert localiser.certain is (present >= 0.85)
-
-
-def test_rivals_end_that_lose_or_stand_in_a_wall_or_where_the_robot_is() -> None:
-    localiser = Told()
-    outside, same, beside = (25.0, 5.0, 0.0), (5.4, 5.0, 0.4), (5.4, 5.0, 0.6)
-    farther = (5.0, 5.6, 0.0)
-    ends = [(outside, 0.2), (same, 0.2), (beside, 0.2), (farther, 0.2), (FAR, -0.5)]
-    stays = (2.0, 18.0, 0.0), -0.49
-    localiser._rivals += [_Rival(pose, lead) for pose, lead in (*ends, stays)]
-    localiser.worth = lambda pose: 0.9
-    localiser.see(SCAN, 0.0)
-    assert [each.pose for each in localiser._rivals] == [beside, farther, stays[0]]
-    assert localiser.alike == [beside, farther]
-    localiser._rivals = [_Rival(FAR, -0.24), _Rival(stays[0], -0.26)]
-    assert localiser.alike == [FAR]
+def test_a_robot_that_stands_is_told_little_by_seeing_the_same_again() -> None:
+    standing, moving = Told(), Told()
+    for localiser in (standing, moving):
+        localiser._belief.rivals.append(Rival(FAR, -4.0))
+        localiser.worth = lambda pose: 0.95 if pose[0] > 10.0 else 0.9
+        for step in range(1, 5):
+            moved(localiser, 0.0 if localiser is standing else 0.2)
+            localiser.see(SCAN, 0.3 * step)
+    assert standing._belief.rivals[0].odds < -3.0 < moving._belief.rivals[0].odds
 
 
 def test_a_slip_is_mended_by_a_pose_close_by_that_explains_more() -> None:
     localiser = Told()
-    # A quarter of a metre ahead, turned by 0.15, is best; less turned it is nearly as good.
+    # A quarter of a metre ahead, turned by 0.15, is best.
     best = (5.25, 5.0, 0.15)
     localiser.worth = lambda pose: 1.0 - min(1.0, 0.9 * math.dist(pose, best))
     localiser.see(SCAN, 0.0)
@@ -353,11 +207,6 @@ def test_a_slip_is_mended_by_a_pose_close_by_that_explains_more() -> None:
     assert localiser.certain
     assert localiser.jumps == 0
     assert localiser.searches == 1, 'moved so far, it may be in a place that looks alike'
-    little = Told()
-    little.worth = lambda pose: 0.95 if pose[2] == 0.15 else 0.8
-    little.see(SCAN, 0.0)
-    assert little.pose == (5.0, 5.0, 0.15)
-    assert little.searches == 0
     chance = Told()
     chance.worth = lambda pose: 0.81 if pose[2] == 0.15 else 0.8
     chance.see(SCAN, 0.0)
@@ -391,7 +240,7 @@ def test_a_scan_is_used_when_the_robot_has_gone_on_or_some_time_has_passed() -> 
 
 def test_a_pose_that_is_told_ends_all_doubt() -> None:
     localiser = Told()
-    localiser._rivals.append(_Rival(APART))
+    localiser._belief.rivals.append(Rival(APART))
     localiser.agrees(0.3, 0.0)
     localiser.believe(FAR)
     assert localiser.pose == FAR

@@ -12,7 +12,7 @@ from floor_plans.parameters import zones_from
 from lidar_navigation import Drive, DriveState, Navigator, Velocity
 from lidar_navigation.driving.obstacle_memory import ObstacleMemory
 from lidar_navigation.geometry import Scan, composed
-from lidar_navigation.localisation.localisation import _Rival
+from lidar_navigation.localisation.belief import Rival
 from lidar_navigation.localisation.place_locator import PlaceRegions
 
 PERIOD = 0.6
@@ -100,7 +100,7 @@ def test_the_places_in_which_a_robot_may_be_are_named(flat: Any, navigator: Navi
     navigator.see(flat.scan(true), 0.0)
     assert navigator.may_be_in == ('B',)
     assert navigator._localiser is not None
-    navigator._localiser._rivals.append(_Rival((2.0, 1.0, 0.0)))
+    navigator._localiser._belief.rivals.append(Rival((2.0, 1.0, 0.0)))
     assert navigator.ambiguous
     assert navigator.may_be_in == ('A', 'B')
 

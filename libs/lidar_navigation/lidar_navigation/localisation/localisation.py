@@ -8,15 +8,10 @@ a corridor.
 How well a pose explains a scan is measured by casting the rays into the map (`scan_fit`). How large
 the part that fits usually is differs between places: all but one in ten rays of a drawn map, fewer
 in a furnished one. When it drops below what is usual here, the robot doubts: it may have been
-pushed, carried, or slipped; or there only are obstacles that the map does not have. What is new
-refutes no pose, and a pose that nothing refutes is kept. A refuted one is looked for: near where it
-was, then everywhere (`pose_search`). A pose nearby that looks the same way and is clearly better is
-taken at once: the robot was pushed, or slipped. Any other one is followed first, as a rival.
-
-Rivals are other poses at which the robot may be. They move with the odometry and are corrected by
-the same scans, until they explain less, or one of them wins. Rooms look alike: so are poses that
-explained about as much as the one that was taken. Only what tells them apart counts, and only
-while the robot moves: a robot that stands sees the same again and again.
+pushed, carried, or slipped; or there only are obstacles that the map does not have. Then it looks
+everywhere (`pose_search`), and follows what it finds beside its own pose (`belief`). What is
+new refutes no pose, and a pose that nothing refutes is kept. Another one is taken once the odds say
+so; until then, and until all that looks alike is ruled out, the robot says that it is not sure.
 """
 
 from __future__ import annotations
@@ -25,10 +20,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed
+from lidar_navigation.localisation.belief import CHANCE, SURE, Belief, told
 from lidar_navigation.localisation.odometry import ContinuousOdometry
-from lidar_navigation.localisation.pose_search import MOST, NEAR, found_poses
+from lidar_navigation.localisation.pose_search import found_poses
 from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
 
 
@@ -36,8 +34,7 @@ from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
 class LocalisationParameters:
     """How the localiser works.
 
-    What a pose explains is a part of the rays, 0 to 1, and two poses are compared by its
-    difference. One difference counts, `better`; what else is compared with is a multiple of it.
+    What a pose explains is a part of the rays, 0 to 1.
 
     Attributes:
         rays: Rays of a scan that are matched; of those two of three are cast into the map.
@@ -48,11 +45,7 @@ class LocalisationParameters:
         doubt_time: How long scans are doubtful before it looks, seconds; one scan is enough when it
             would be lost.
         lost_below: It counts as lost when none is found and a smaller part than this agrees.
-        lost_pause: Time between two looks while it is lost, seconds.
-        better: A pose must explain this much more to be taken instead of another one.
-        slip: So far wheels slip, or somebody pushes the robot, metres or rad: a better pose within
-            that is taken at once; a farther one is followed first.
-        rounds: After so many searches without a winner the present pose is kept.
+        search_pause: Time between two looks while it is lost or in doubt, seconds.
     """
 
     rays: int = 90
@@ -62,72 +55,25 @@ class LocalisationParameters:
     doubt_drop: float = 0.12
     doubt_time: float = 0.2
     lost_below: float = 0.55
-    lost_pause: float = 1.0
-    better: float = 0.1
-    slip: float = 1.0
-    rounds: int = 5
+    search_pause: float = 1.0
 
     @property
     def cast_rays(self) -> int:
         """Rays that are cast into the map to measure how well a pose explains a scan."""
         return 2 * self.rays // 3
 
-    @property
-    def far_better(self) -> float:
-        """How much more a pose far away must explain: that somebody carried the robot is unlikely.
-        Likewise what a robot that stands must see of a rival, for it sees the same again and again.
-        """
-        return 2 * self.better
 
-    @property
-    def noise(self) -> float:
-        """Of two poses that explain a scan as well the one explains this much more by chance.
-
-        A challenger loses as much with each scan that the present pose explains, too.
-        """
-        return self.better / 2
-
-    @property
-    def rival_wins(self) -> float:
-        """A rival that explained so much more, summed over scans, is taken instead,"""
-        return 8 * self.better
-
-    @property
-    def equal_wins(self) -> float:
-        """or this much more, if it was as likely as the present pose."""
-        return 3 * self.better
-
-    @property
-    def rival_loses(self) -> float:
-        """A rival that explained so much less is forgotten."""
-        return 5 * self.better
-
-
-_FORGOTTEN = 0.1
-"""This part of the sum of a rival is forgotten with each scan that tells something."""
-_STANDING = 0.7
-"""Of a robot that stands this part of a difference counts."""
 _USUAL_RISE, _USUAL_FALL = 0.05, 0.02
 """By these parts of a difference the usual agreement rises and falls with a scan."""
+_WORSE = 0.1
+"""So much less than what is tolerated begins another doubt."""
 _NUDGE = 0.2
 """A correction of more than this, metres or rad, may as well be that somebody put the robot into a
 place that looks alike."""
-
-
-@dataclass
-class _Rival:
-    """Another pose at which the robot may be.
-
-    Attributes:
-        pose: The pose.
-        lead: By how much it explained more, summed over scans that are slowly forgotten.
-        is_equal: Whether it was as likely as the present pose when that was taken; else it
-            challenges a pose that was followed all the time.
-    """
-
-    pose: Pose
-    lead: float = 0.0
-    is_equal: bool = True
+_SAME_VIEW = 0.1
+"""So much of a scan is new, for each `update_period`, where the robot stands."""
+_NEW_VIEW = 0.4
+"""Of a robot that goes so far, metres, all that it sees is seen anew."""
 
 
 class Localiser:
@@ -139,7 +85,6 @@ class Localiser:
         before_search: Called before a search everywhere, which takes up to a second.
 
     Attributes:
-        pose: The estimate: x, y in metres, yaw in rad, map frame.
         agreement: The part of the last scan's rays that the estimate explains, 0 to 1.
         lost: Whether the estimate is known to be wrong and no better one is found yet.
         jumps: How often the robot was found somewhere else.
@@ -153,7 +98,7 @@ class Localiser:
     ) -> None:
         self.parameters = LocalisationParameters()
         self._before_search = before_search
-        self.pose = pose
+        self._belief = Belief(pose)
         self.agreement = 1.0
         self.lost = False
         self.jumps = 0
@@ -162,8 +107,7 @@ class Localiser:
         self._tolerated = 1.0
         self._usual = 1.0
         self._shaken = False
-        self._rounds = 0
-        self._rivals: list[_Rival] = []
+        self._verify_at = -math.inf
         self._moved = (0.0, 0.0)
         self._used_at: float | None = None
         self.set_map(grid)
@@ -178,6 +122,11 @@ class Localiser:
         return self._fit.grid
 
     @property
+    def pose(self) -> Pose:
+        """The estimate: x, y in metres, yaw in rad, map frame."""
+        return self._belief.pose
+
+    @property
     def plausible(self) -> bool:
         """Whether the estimate is good enough to say which place the robot is in."""
         return not self.lost and self.agreement >= self.parameters.lost_below
@@ -189,25 +138,24 @@ class Localiser:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether the robot may as well be elsewhere: a rival explains about as much."""
-        return bool(self.alike)
+        """Whether the robot may as well be elsewhere: nothing rules out a rival, or nobody has
+        looked yet whether there is one.
+        """
+        return self._shaken or bool(self.alike)
 
     @property
     def alike(self) -> list[Pose]:
         """The other poses that explain about as much as the estimate."""
-        least = -self.parameters.rival_loses / 2
-        return [rival.pose for rival in self._rivals if rival.lead > least]
+        return self._belief.alike
 
     def believe(self, pose: Pose) -> None:
         """Take a pose that somebody gave as the estimate."""
-        self.pose = pose
+        self._belief.believe(pose)
         self.lost = False
         self._look_at = None
         self._tolerated = 1.0
         self._shaken = False
-        self._rounds = 0
         self._used_at = None
-        self._rivals.clear()
 
     def move(self, odometry: Pose, stamp: float | None = None) -> None:
         """Take a new reading of the odometry.
@@ -217,9 +165,7 @@ class Localiser:
             stamp: Its time, seconds; None: not known.
         """
         step, missed = self._odometry.step(odometry, stamp)
-        self.pose = composed(self.pose, step)
-        for rival in self._rivals:
-            rival.pose = composed(rival.pose, step)
+        self._belief.move(step)
         # What was missed counts as driven: the next scan is sought so much farther away.
         way = math.hypot(*step[:2]) + missed[0]
         self._moved = (self._moved[0] + way, self._moved[1] + abs(step[2]) + missed[1])
@@ -237,97 +183,85 @@ class Localiser:
         p = self.parameters
         if not self._is_due(now):
             return False
-        self._used_at = now
         thin = scan.thinned(p.rays)
+        information = self._information(thin, now)
+        self._used_at = now
         moved, self._moved = self._moved, (0.0, 0.0)
-        slack = self.grid.resolution + 0.2 * moved[0] + moved[1]
-        corrected = self._fit.matched(
-            self.pose, self._fit.mapped(self.pose, thin, slack).points, moved
-        )
-        rays = thin.thinned(p.cast_rays)
-        evidence = self._fit.evidence(corrected, rays)
-        agreement = evidence.fit
-        if agreement < self._enough:
-            before = corrected
+        corrected, evidence = self._corrected(self.pose, thin, moved)
+        if evidence.fit < self._enough and evidence.refutes:
             corrected, evidence = self._nudged(corrected, evidence, thin, moved)
-            agreement = evidence.fit
-            way, turn = math.dist(before[:2], corrected[:2]), angle_between(before[2], corrected[2])
-            if way > _NUDGE or abs(turn) > _NUDGE:
-                # Somebody may have put it into another room that looks alike.
-                self._shaken = True
-        winner = self._weighed(corrected, evidence, thin, moved)
-        if winner is not None:
-            self.jumps += 1
-            corrected, evidence = winner
-            # Also where it does not explain enough to be sure of.
-            self.pose = corrected
-        self._judge(corrected, evidence, thin, now)
+        if _is_pushed(self.pose, corrected, moved):
+            # Somebody may have put it into another room that looks alike.
+            self._shaken = True
+        self._belief.pose = corrected
+        self._belief.weigh(
+            self._likelihood(evidence),
+            lambda pose: self._weighed(pose, thin, moved),
+            information,
+        )
+        evidence = self._followed(evidence, thin)
+        self._judge(evidence, thin, now)
         return True
+
+    def _information(self, scan: Scan, now: float) -> float:
+        """Return how much of a scan is new, 0 to 1.
+
+        A lidar that sees all around sees the same again where its robot turns on the spot.
+        """
+        if self._used_at is None:
+            return 1.0
+        unseen = max(0.0, 1.0 - float(np.ptp(scan.angles)) / math.tau) if len(scan.angles) else 0.0
+        standing = _SAME_VIEW * (now - self._used_at) / self.parameters.update_period
+        way, turn = self._moved
+        return min(1.0, max(standing, way / _NEW_VIEW + unseen * turn))
+
+    def _corrected(
+        self, pose: Pose, thin: Scan, moved: tuple[float, float]
+    ) -> tuple[Pose, Evidence]:
+        """Return a pose corrected by a scan, and what that says of it."""
+        slack = self.grid.resolution + 0.2 * moved[0] + moved[1]
+        pose = self._fit.matched(pose, self._fit.mapped(pose, thin, slack).points, moved)
+        return pose, self._fit.evidence(pose, thin.thinned(self.parameters.cast_rays))
+
+    def _weighed(self, pose: Pose, thin: Scan, moved: tuple[float, float]) -> tuple[Pose, float]:
+        pose, evidence = self._corrected(pose, thin, moved)
+        return pose, self._likelihood(evidence) if self._fit.can_stand(pose) else -math.inf
+
+    def _likelihood(self, evidence: Evidence) -> float:
+        """Return how likely a scan is, nats.
+
+        Where no pose was believed before, a wall where the map has a door tells as much as a door
+        where it has a wall.
+        """
+        return evidence.blank_likelihood if self._shaken else evidence.log_likelihood
 
     def _nudged(
         self, pose: Pose, evidence: Evidence, thin: Scan, moved: tuple[float, float]
     ) -> tuple[Pose, Evidence]:
-        """Return a pose close by that explains more, as after a slip; else the same pose."""
+        """Return a pose close by that is likelier, as after a slip; else the same pose."""
         rays = thin.thinned(self.parameters.cast_rays)
-        best, more = (pose, evidence), self.parameters.better
+        best, most = (pose, evidence), evidence.log_likelihood
         for turn in (-0.3, -0.15, 0.0, 0.15, 0.3):
             for dx, dy in ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.0, -0.25)):
                 start = composed(pose, (dx, dy, turn))
                 tried = self._fit.matched(start, thin.points, (moved[0] + 0.3, moved[1] + 0.3))
                 explained = self._fit.evidence(tried, rays)
-                if explained.fit > best[1].fit + more and self._fit.can_stand(tried):
-                    best, more = (tried, explained), 0.0
+                likely = explained.log_likelihood + self._belief.prior(tried)
+                if likely > most and self._fit.can_stand(tried):
+                    best, most = (tried, explained), likely
         return best
 
-    def _weighed(
-        self, present: Pose, evidence: Evidence, thin: Scan, moved: tuple[float, float]
-    ) -> tuple[Pose, Evidence] | None:
-        """Correct the rivals by a scan; return the one that wins over the present pose, if any."""
-        p = self.parameters
-        best: tuple[_Rival, Evidence] | None = None
-        moves = moved[0] >= p.update_step / 2 or moved[1] >= p.update_step / 2
-        # What is new may explain all that speaks against it.
-        plausible = evidence.fit >= self._enough or not evidence.refutes
-        for rival in self._rivals:
-            rival.pose = self._fit.matched(rival.pose, thin.points, moved)
-            explained = self._fit.evidence(rival.pose, thin.thinned(p.cast_rays))
-            more = explained.fit - evidence.fit
-            if rival.is_equal:
-                # Neither was believed before: a wall where the map has a door tells them apart.
-                more = explained.hit - evidence.hit
-            if moves:
-                # What tells nothing makes nothing forgotten, either.
-                if abs(more) > p.noise:
-                    rival.lead += more - _FORGOTTEN * rival.lead
-                if plausible and not rival.is_equal:
-                    rival.lead -= p.noise
-            elif abs(more) >= p.far_better:
-                rival.lead += _STANDING * more - _FORGOTTEN * rival.lead
-            if not self._fit.can_stand(rival.pose) or self._same(rival.pose, present):
-                rival.lead = -math.inf
-            elif (
-                (rival.is_equal or not plausible)
-                and rival.lead >= (p.equal_wins if rival.is_equal else p.rival_wins)
-                and (best is None or rival.lead > best[0].lead)
-            ):
-                best = rival, explained
-        self._rivals = [each for each in self._rivals if each.lead > -p.rival_loses]
-        if best is None:
-            return None
-        winner, explained = best
-        # Those that were found before it lose its lead. Those found since, and the pose that is
-        # left, stay as likely as they were: where rooms look alike, that is quicker (of 60 carried
-        # robots 55 were found within 90 s, 52 where all lost it, half of them twice as late).
-        place = self._rivals.index(winner)
-        for rival in self._rivals[:place]:
-            rival.lead -= winner.lead
-        self._rivals[place:] = [*self._rivals[place + 1 :], _Rival(present, 0.0)]
-        return winner.pose, explained
+    def _followed(self, evidence: Evidence, thin: Scan) -> Evidence:
+        """Follow another pose if the odds say so; return what the scan says of the one followed.
 
-    @staticmethod
-    def _same(first: Pose, second: Pose) -> bool:
-        turned = abs(angle_between(first[2], second[2]))
-        return math.dist(first[:2], second[:2]) < 0.5 and turned < 0.5
+        A pose that something new explains is kept, however well another one fits.
+        """
+        margin = CHANCE if self._shaken else SURE
+        is_kept = not (self._shaken or evidence.refutes)
+        if is_kept or not self._belief.follow_best(margin):
+            return evidence
+        self.jumps += 1
+        return self._fit.evidence(self.pose, thin.thinned(self.parameters.cast_rays))
 
     def _is_due(self, now: float) -> bool:
         p = self.parameters
@@ -340,20 +274,19 @@ class Localiser:
             or now - self._used_at >= p.update_period
         )
 
-    def _judge(self, corrected: Pose, evidence: Evidence, thin: Scan, now: float) -> None:
-        p, agreement = self.parameters, evidence.fit
-        enough = self._enough
+    def _judge(self, evidence: Evidence, thin: Scan, now: float) -> None:
+        p, enough = self.parameters, self._enough
+        self.agreement = agreement = evidence.fit
         if agreement >= enough:
             self._tolerated = 1.0
-        if agreement >= max(p.lost_below, min(enough, self._tolerated - p.better)):
-            self._settle(corrected, agreement)
-            if self._shaken and agreement >= enough:
-                # What fits again may be another place that looks alike.
-                self._shaken = False
-                self._before_search()
-                self._rivals = self._alike([(corrected, evidence), *self.search(thin)])
+        if agreement >= max(p.lost_below, min(enough, self._tolerated - _WORSE)):
+            self._settle()
+            if self._shaken and not self.alike and now >= self._verify_at:
+                # What fits again, or is left, may be a place like others that nobody looked at.
+                self._verify_at = now + p.search_pause
+                self._look(evidence, thin, is_lost=True)
+                self._shaken = bool(self.alike)
             return
-        self.agreement = agreement
         if self._look_at is None:
             self._look_at = now + p.doubt_time
         if agreement < p.lost_below and not self.lost:
@@ -362,94 +295,51 @@ class Localiser:
             self._look_at = min(self._look_at, now)
         if now < self._look_at - 1e-9:
             return
-        if self._follows_better and self._rounds < p.rounds:
-            # The next scans decide.
-            self._rounds += 1
-            return
-        self._before_search()
-        candidates = self.search(thin)
-        # A pose that something new explains is kept, however well another one fits.
-        found = candidates[0] if candidates and evidence.refutes else None
-        if (
-            found is not None
-            and self._is_near(found[0])
-            and found[1].fit >= max(p.lost_below, agreement + p.better)
-        ):
-            self.jumps += 1
-            self._settle(found[0], found[1].fit)
-            self._shaken = False
-            # Somebody may only have stood in the way: where it was until now stays likely.
-            self._rivals = [_Rival(corrected, agreement - found[1].fit), *self._alike(candidates)]
-        elif found is not None and self._follow(candidates, agreement) and self._rounds < p.rounds:
-            self._rounds += 1
-        elif agreement >= p.lost_below:
-            # Nothing explains the scan better: what is seen is not on the map.
-            self._tolerated = agreement
-            self._settle(corrected, agreement)
-        else:
+        self._look(evidence, thin, is_lost=self.lost)
+        before = self.jumps
+        evidence = self._followed(evidence, thin)
+        self.agreement = evidence.fit
+        if self.jumps > before and evidence.fit >= p.lost_below:
+            self._settle()
+        elif evidence.fit < p.lost_below:
             self.lost = True
-            self._look_at = now + p.lost_pause
+            self._look_at = now + p.search_pause
+        elif evidence.refutes and self.ambiguous:
+            # The next scans decide.
+            self._look_at = now + p.search_pause
+        else:
+            # Nothing explains the scan better: what is seen is not on the map.
+            self._tolerated = evidence.fit
+            self._settle()
+
+    def _look(self, evidence: Evidence, thin: Scan, *, is_lost: bool) -> None:
+        """Look for other poses everywhere.
+
+        Args:
+            evidence: What the scan says of the estimate.
+            thin: The scan.
+            is_lost: Nobody knows where the robot was before.
+        """
+        self._before_search()
+        found = []
+        for pose, explained in self.search(thin):
+            odds = told(self._likelihood(explained) - self._likelihood(evidence))
+            found.append((pose, odds if is_lost else odds + self._belief.prior(pose)))
+        self._belief.add(found)
 
     @property
     def _enough(self) -> float:
         """The part of the rays from which on the estimate is not doubted here."""
         return min(self.parameters.doubt_below, self._usual - self.parameters.doubt_drop)
 
-    def _is_near(self, pose: Pose) -> bool:
-        """Tell whether a push or a slip may have brought the robot there."""
-        p = self.parameters
-        turned = abs(angle_between(self.pose[2], pose[2]))
-        return math.dist(pose[:2], self.pose[:2]) <= p.slip and turned <= 0.8 * p.slip
-
-    def _needed(self, pose: Pose) -> float:
-        """Return how much more a pose must explain to be followed."""
-        p = self.parameters
-        return p.better if math.dist(pose[:2], self.pose[:2]) <= NEAR else p.far_better
-
-    @property
-    def _follows_better(self) -> bool:
-        """Whether a rival leads."""
-        return any(rival.lead > 0.0 for rival in self._rivals)
-
-    def _follow(self, candidates: list[tuple[Pose, Evidence]], agreement: float) -> bool:
-        """Follow poses far away, or turned, that explain much more; tell whether there are any."""
-        p = self.parameters
-        better = [
-            explained.fit
-            for pose, explained in candidates
-            if explained.fit >= max(p.lost_below, agreement + self._needed(pose))
-        ]
-        if not better:
-            return False
-        # With it those that look alike, wherever they are.
-        alike = [each for each in candidates if each[1].fit >= max(better) - p.better / 2]
-        known = [rival.pose for rival in self._rivals]
-        for pose, explained in alike[:MOST]:
-            if not any(self._same(pose, other) for other in known):
-                known.append(pose)
-                self._rivals.append(_Rival(pose, (explained.fit - agreement) / 3, is_equal=False))
-        return True
-
-    def _settle(self, pose: Pose, agreement: float) -> None:
-        self.pose, self.agreement = pose, agreement
+    def _settle(self) -> None:
         self.lost = False
         self._look_at = None
-        self._rounds = 0
-        rate = _USUAL_RISE if agreement > self._usual else _USUAL_FALL
+        rate = _USUAL_RISE if self.agreement > self._usual else _USUAL_FALL
         if self._tolerated < 1.0:
             # A search found nothing better: it is what the place is like.
             rate = 0.2
-        self._usual += rate * (agreement - self._usual)
-
-    def _alike(self, candidates: list[tuple[Pose, Evidence]]) -> list[_Rival]:
-        """Return the candidates that explain about as much as the first."""
-        p = self.parameters
-        taken: list[Pose] = [candidates[0][0]]
-        for pose, explained in candidates[1:]:
-            good = explained.hit >= max(candidates[0][1].hit - p.better, p.lost_below)
-            if good and not any(self._same(pose, other) for other in taken):
-                taken.append(pose)
-        return [_Rival(pose) for pose in taken[1 : MOST + 1]]
+        self._usual += rate * (self.agreement - self._usual)
 
     def search(self, scan: Scan) -> list[tuple[Pose, Evidence]]:
         """Return poses anywhere that explain a scan, and its evidence; the likeliest first."""
@@ -458,3 +348,10 @@ class Localiser:
     def explained(self, pose: Pose, scan: Scan) -> float:
         """Return how well a pose explains a scan, 0 to 1 (`Evidence.fit`)."""
         return self._fit.evidence(pose, scan).fit
+
+
+def _is_pushed(before: Pose, after: Pose, moved: tuple[float, float]) -> bool:
+    """Tell whether more lies between two poses than odometry is wrong over a way and a turn."""
+    turned = abs(angle_between(before[2], after[2]))
+    way = math.dist(before[:2], after[:2])
+    return way > _NUDGE + moved[0] / 2 or turned > _NUDGE + moved[1] / 2

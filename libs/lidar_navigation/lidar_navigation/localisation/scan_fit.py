@@ -36,6 +36,11 @@ SUPPORT = 0.2
 """or a smaller one goes as far as it should."""
 SPREAD = 0.2
 """Points further than about this from any edge lose their weight, metres."""
+SHORT_NATS, LONG_NATS = 6.0, 24.0
+"""By how much a scan is less likely all of whose rays are too short, or too long, nats.
+
+Neighbouring rays meet the same thing, so that a scan counts as a dozen of them.
+"""
 BODY = 0.15
 """Radius within which a robot cannot overlap anything, metres."""
 
@@ -62,6 +67,16 @@ class Evidence(NamedTuple):
         if self.long > REFUTING:
             return self.hit
         return self.hit + SHORT * self.short
+
+    @property
+    def log_likelihood(self) -> float:
+        """How likely the scan is from the pose, nats below one that goes as far as it should."""
+        return -SHORT_NATS * self.short - LONG_NATS * self.long
+
+    @property
+    def blank_likelihood(self) -> float:
+        """The same of a robot that may be anywhere, for which nothing has changed before it."""
+        return -(SHORT_NATS + LONG_NATS) / 2 * (self.short + self.long)
 
     @property
     def refutes(self) -> bool:
