@@ -153,6 +153,39 @@ def pose_of_serialized(data: bytes, texts: int = 0) -> PlanarPose:
     return planar_pose(x, y, turn)
 
 
+def frames_of_serialized(data: bytes, texts: int = 0) -> bytes:
+    """Return the part of a stamped message that names its frame and the texts behind it, as it is.
+
+    Args:
+        data: The message, as `pose_of_serialized` takes it.
+        texts: How many texts there are behind the header.
+
+    Raises:
+        ValueError: It is no such message.
+    """
+    at = begin = _HEAD + 8
+    for _ in range(1 + texts):
+        at += -at % 4
+        at += 4 + int(_read(data, 'I', at)[0])
+    return bytes(data[begin:at])
+
+
+def turn_rate_of_serialized(data: bytes) -> float:
+    """Return what a sensor_msgs/Imu says of the turn about its z axis, rad/s.
+
+    Raises:
+        ValueError: It is no such message, or says nothing of it (a covariance of -1).
+    """
+    at = _HEAD + 8
+    at += 4 + int(_read(data, 'I', at)[0])
+    at += (_HEAD - at) % 8
+    # Behind an orientation and its covariance.
+    *_, rate, unknown = _read(data, '17d', at)
+    if unknown == -1.0 or not math.isfinite(rate):
+        raise ValueError('a turn rate that is not known: expected rad/s about z')
+    return rate
+
+
 def _read(data: bytes, fields: str, at: int) -> tuple[float, ...]:
     order = _BYTE_ORDERS.get(bytes(data[:2]))
     if order is None:

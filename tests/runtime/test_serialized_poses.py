@@ -11,13 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu
 
 from surveillance_runtime.conversions import (
+    frames_of_serialized,
     pose_from,
     pose_message,
     pose_of_serialized,
     seconds_of,
     stamp_of_serialized,
+    turn_rate_of_serialized,
 )
 
 NAMES = st.text(st.characters(blacklist_characters='\0', blacklist_categories=['Cs']), max_size=20)
@@ -64,3 +67,27 @@ def test_a_pose_that_is_none_is_refused() -> None:
     message.pose.pose.position.x = math.nan
     with pytest.raises(ValueError, match='not finite'):
         pose_of_serialized(serialize_message(message), texts=1)
+
+
+@given(NAMES, st.floats(-1e3, 1e3))
+def test_the_turn_rate_of_a_gyroscope_is_that_which_rclpy_reads(frame: str, rate: float) -> None:
+    message = Imu()
+    message.header.frame_id = frame
+    message.angular_velocity.x, message.angular_velocity.z = 9.0, rate
+    assert turn_rate_of_serialized(serialize_message(message)) == rate
+
+
+@pytest.mark.parametrize(('rate', 'covariance'), [(math.nan, 0.0), (0.1, -1.0)])
+def test_a_turn_rate_that_is_not_known_is_refused(rate: float, covariance: float) -> None:
+    message = Imu()
+    message.angular_velocity.z, message.angular_velocity_covariance[0] = rate, covariance
+    with pytest.raises(ValueError, match='expected rad/s about z'):
+        turn_rate_of_serialized(serialize_message(message))
+
+
+@given(NAMES, NAMES, st.floats(-5.0, 5.0))
+def test_frames_differ_where_their_names_do(child: str, other: str, x: float) -> None:
+    first, second = Odometry(child_frame_id=child), Odometry(child_frame_id=other)
+    second.pose.pose.position.x = x
+    names = [frames_of_serialized(serialize_message(each), texts=1) for each in (first, second)]
+    assert (names[0] == names[1]) is (child == other)

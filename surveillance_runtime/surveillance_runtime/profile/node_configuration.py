@@ -153,6 +153,7 @@ def remappings(profile: RobotProfile, nodes: Collection[str], mode: str) -> list
         'cmd_vel': topics.wanted if monitored else topics.command,
         'cmd_vel_monitored': topics.command,
         'odom': topics.odom,
+        'imu': topics.imu,
         'map': topics.map,
         'camera/rgb/image_raw': topics.image,
         'camera/rgb/camera_info': topics.camera_info,

@@ -74,6 +74,11 @@ class Topics:
         check=topic_name,
     )
     odom: str = parameter('odom', 'Odometry, nav_msgs/Odometry.', check=topic_name)
+    imu: str = parameter(
+        'imu',
+        'A gyroscope where there is one, sensor_msgs/Imu: its turns count beside the wheels.',
+        check=topic_name,
+    )
     scans: tuple[str, ...] = parameter(
         ('scan',), 'One for each lidar, sensor_msgs/LaserScan.', check=topic_names
     )

@@ -12,13 +12,16 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import Imu
 
-from lidar_navigation.geometry import Pose, composed, relative
-from lidar_navigation.localisation.odometry import began_anew
+from lidar_navigation.geometry import Pose
+from lidar_navigation.localisation.true_odometry import TrueOdometry
 from surveillance_runtime.conversions import (
+    frames_of_serialized,
     pose_of_serialized,
     seconds_of,
     stamp_of_serialized,
+    turn_rate_of_serialized,
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.check_up import BASE_FRAMES
@@ -148,8 +151,11 @@ class OdometryReader:
         self._take = take
         self._by_tf: Subscription | None = None
         self.child = ''
-        self._scale = node.declare_fields(OdometryScale(), prefix='odometry.')
-        self._scaled: tuple[Pose, float] | None = None
+        scale = node.declare_fields(OdometryScale(), prefix='odometry.')
+        self._true = TrueOdometry(scale.scale, scale.turn_scale)
+        self._names: bytes | None = None
+        self._gyroscope = StampOffset(str(node.resolve_topic_name('imu')))
+        node.create_subscription(Imu, 'imu', self._on_turn_rate, SENSOR_QOS, raw=True)
         StateSubscription(
             node,
             Odometry,
@@ -172,8 +178,26 @@ class OdometryReader:
         with conversions.refusing(self._node, 'odom'):
             measured = self.stream.come(stamp_of_serialized(serialized), serialized)
             if measured is not None:
-                self._take(self._true(pose_of_serialized(serialized, texts=1), measured), measured)
-                self.stream.hear()
+                names = frames_of_serialized(serialized, texts=1)
+                if names != self._names and self._names is not None:
+                    self._true.restart()
+                self._names = names
+                self._hear(pose_of_serialized(serialized, texts=1), measured)
+
+    def _on_turn_rate(self, serialized: bytes) -> None:
+        """Take what a gyroscope tells: turns that the wheels do not, or wrongly."""
+        with conversions.refusing(self._node, 'imu'):
+            stamp, rate = stamp_of_serialized(serialized), turn_rate_of_serialized(serialized)
+            now = float(self._node.get_clock().now().nanoseconds) / 1e9
+            if self._node.is_simulated or stamp == 0.0:
+                self._true.turn(stamp or now, rate)
+            else:
+                self._true.turn(measured_at(self._node, self._gyroscope, stamp, now), rate)
+
+    def _hear(self, reading: Pose, measured: float) -> None:
+        self.reading = reading
+        self._take(self._true.take(reading, measured), measured)
+        self.stream.hear()
 
     def _look_for_topic(self) -> None:
         """Hear `tf` while nobody publishes the topic; it costs much where all robots share it."""
@@ -194,23 +218,4 @@ class OdometryReader:
                 measured = self.stream.come(seconds_of(each.header.stamp), matrix.tobytes())
                 if measured is not None:
                     x, y = matrix[:2, 3].tolist()
-                    pose = x, y, math.atan2(matrix[1, 0], matrix[0, 0])
-                    self._take(self._true(pose, measured), measured)
-                    self.stream.hear()
-
-    def _true(self, reading: Pose, measured: float) -> Pose:
-        """Return a reading in true metres and radians."""
-        before, self.reading = self.reading, reading
-        if self._scale == OdometryScale():
-            return reading
-        pose = reading
-        if (
-            before is not None
-            and self._scaled is not None
-            and not began_anew(before, reading, measured - self._scaled[1])
-        ):
-            x, y, turn = relative(before, reading)
-            k = self._scale.scale
-            pose = composed(self._scaled[0], (k * x, k * y, self._scale.turn_scale * turn))
-        self._scaled = pose, measured
-        return pose
+                    self._hear((x, y, math.atan2(matrix[1, 0], matrix[0, 0])), measured)

@@ -30,6 +30,8 @@ _TOP_SPEED, _TOP_TURN = 3.0, 4.0
 """No robot of this kind drives or turns faster, m/s and rad/s."""
 _ZERO = 0.15
 """A driver that begins anew gives poses this near to zero, metres and rad."""
+_AT_ZERO = 0.02
+"""One that gives poses as near as this has not gone anywhere yet."""
 _MOST_READINGS = 4000
 
 
@@ -44,11 +46,19 @@ def began_anew(first: Pose, second: Pose, seconds: float | None) -> bool:
     """
     dx, dy, turn = relative(first, second)
     way, turned = math.hypot(dx, dy), abs(turn)
+    is_at_zero = seconds is not None and seconds >= 0.0 and max(map(abs, second)) < _AT_ZERO
+    # Of a driver that begins anew also a short way is none that was driven.
+    if is_at_zero and _is_too_fast(way, turned, seconds or 0.0, _AT_ZERO, _AT_ZERO):
+        return True
     if way <= _SMALL_STEP and turned <= _SMALL_TURN:
         return False
     if seconds is None or seconds < 0.0 or max(map(abs, second)) < _ZERO:
         return True
-    return way > _SMALL_STEP + _TOP_SPEED * seconds or turned > _SMALL_TURN + _TOP_TURN * seconds
+    return _is_too_fast(way, turned, seconds, _SMALL_STEP, _SMALL_TURN)
+
+
+def _is_too_fast(way: float, turned: float, seconds: float, more: float, more_turn: float) -> bool:
+    return way > more + _TOP_SPEED * seconds or turned > more_turn + _TOP_TURN * seconds
 
 
 class ContinuousOdometry:
