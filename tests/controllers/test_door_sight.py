@@ -94,10 +94,23 @@ def test_one_who_walks_past_shuts_no_door() -> None:
 def test_a_door_that_nobody_looked_at_for_long_may_be_open_again() -> None:
     looking = Looking()
     looking.look((2.0, 1.5, 0.3), closed=True)
-    looking.now += COUNTS_FOR
+    looking.now += COUNTS_FOR[0]
 
     # In the other corner, from where the door is not to be seen.
     assert looking.look((6.9, 2.9, 0.0), closed=True, times=1)
+    assert looking.sight.shut == frozenset()
+
+
+def test_a_door_that_stays_shut_is_looked_at_less_and_less() -> None:
+    looking = Looking()
+    looking.look((2.0, 1.5, 0.3), closed=True)
+    looking.now += 100.0
+    looking.look((2.0, 1.5, 0.3), closed=True)
+    looking.now += 90.0
+    looking.look((6.9, 2.9, 0.0), closed=True, times=1)
+    assert looking.sight.shut == {'D'}
+    looking.now += 30.0
+    looking.look((6.9, 2.9, 0.0), closed=True, times=1)
     assert looking.sight.shut == frozenset()
 
 

@@ -1,8 +1,9 @@
 """Which doors the robot has seen shut on its way: no door tells it in a real building.
 
 Each scan is read door by door (`indoor_watch.doors`). Most of the last readings must agree before a
-door is shut, or open again: people stand in doorways. A door that has not been looked at for long
-may be open again; the robot has to go there to see it, so it is no longer taken for shut then.
+door is shut, or open again: people stand in doorways. A door that nobody looks at may be open
+again, and the robot has to go there to see it. So it counts as shut for as long again as it is
+known to have been shut: one that has just been shut is looked at soon, one that stays shut seldom.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ READINGS, AGREEING = 8, 7
 """So many of the last readings must agree."""
 AT_ONCE = 10.0
 """Readings that are older than this say nothing of now, seconds."""
-COUNTS_FOR = 300.0
-"""A shut door counts for this long after it was seen so last, seconds."""
+COUNTS_FOR = 30.0, 600.0
+"""A shut door counts for at least and at most this long after it was seen so last, seconds."""
 _SURE = 0.8
 """A reading that is less likely than this says nothing."""
 
@@ -36,7 +37,15 @@ _SURE = 0.8
 class _SeenDoor:
     segment: Segment
     readings: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=READINGS))
-    shut_at: float | None = None
+    shut_since: float | None = None
+    shut_at: float = -math.inf
+
+    def is_shut(self, now: float) -> bool:
+        """Tell whether it counts as shut."""
+        if self.shut_since is None:
+            return False
+        least, most = COUNTS_FOR
+        return 0.0 <= now - self.shut_at <= min(max(self.shut_at - self.shut_since, least), most)
 
 
 class DoorSight:
@@ -95,11 +104,7 @@ class DoorSight:
                 self._read(door, lidar, ends, now)
         before, self._shut = (
             self._shut,
-            frozenset(
-                name
-                for name, door in self._doors.items()
-                if door.shut_at is not None and 0.0 <= now - door.shut_at <= COUNTS_FOR
-            ),
+            frozenset(name for name, door in self._doors.items() if door.is_shut(now)),
         )
         return self._shut != before
 
@@ -113,4 +118,9 @@ class DoorSight:
             door.readings.clear()
         door.readings.append((now, is_shut))
         if sum(shut == is_shut for _, shut in door.readings) >= AGREEING:
-            door.shut_at = now if is_shut else None
+            if not is_shut:
+                door.shut_since = None
+                return
+            door.shut_at = now
+            if door.shut_since is None:
+                door.shut_since = now

@@ -6,7 +6,7 @@ A path that only says where to turn (`spin_in_place`) becomes a Spin goal.
 
 Where the robot is, `map -> odom -> base` on `tf` says, else `amcl_pose`. Where no other program
 tells `amcl_pose` (slam_toolbox, RTAB-Map, Cartographer), this one does, from `tf`: planner, battery
-and page read it.
+and page read it. From there its scans show which doors are shut.
 """
 
 from __future__ import annotations
@@ -24,11 +24,13 @@ from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import LaserScan
 
 from lidar_navigation import PlaceLocator
 from lidar_navigation.geometry import (
     Points,
     Pose,
+    Scan,
     angle_between,
     distance_nearest,
     equally_spaced,
@@ -36,12 +38,14 @@ from lidar_navigation.geometry import (
     point_of,
     points_passed,
 )
+from lidar_navigation.robot_base import robot_radius
 from state_machines import Interrupt
 from state_machines.ros import GoalEnd, GoalRun
 from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
+from surveillance_controllers.motion.door_teller import DoorTeller
 from surveillance_controllers.motion.holding import Hold
 from surveillance_controllers.motion.nav2_goals import (
     DRIVING_SERVERS,
@@ -65,6 +69,7 @@ from surveillance_runtime.profile.parameters import declared_frames
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.sensing.conversions import refusing
 from surveillance_runtime.sensing.frames_heard import FramesHeard
+from surveillance_runtime.sensing.transforms import ScanReader
 from surveillance_runtime.spin_in_place import bearing_of
 from surveillance_runtime.state_topics import StateSubscription
 
@@ -84,6 +89,15 @@ STALLED = 90.0
 never answers, or a costmap does not clear. Nav2's own recoveries are through before."""
 MOVED = 0.25
 """It has moved when it is this far from where it was, metres."""
+
+STEADY = 0.3
+"""Doors are read while the robot turns no faster, rad/s: `tf` says where it is a little later than
+the scan was made."""
+
+
+@dataclass(frozen=True)
+class _Body:
+    radius: float = robot_radius()
 
 
 @dataclass
@@ -181,6 +195,10 @@ class Nav2Motion:
             self._on_pose,
             stamp=lambda told: seconds_of(told.header.stamp),
         )
+        self._doors = DoorTeller(node, door_segments(node))
+        self._seen_from: tuple[Pose, float] | None = None
+        self._lidar = ScanReader(node, node.declare_fields(_Body()).radius, self._frames.base)
+        self._lidar.subscribe(self._on_scan)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(POSE_PERIOD, self._look, clock=steady)
 
@@ -306,6 +324,19 @@ class Nav2Motion:
                 progress.moved_at = run.now()
             elif run.now() - progress.moved_at > STALLED:
                 stalled.set()
+
+    def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
+        """Read the doors by a scan, if it is known from where it was made."""
+        found = self._tf.pose(self._frames.base, self._frames.map, FRESH)
+        before, self._seen_from = self._seen_from, None
+        if found is None:
+            return
+        pose, now = found[0], seconds_of(message.header.stamp)
+        self._seen_from = pose, now
+        if before is not None and 0.0 < now - before[1] < FRESH:
+            turned = abs(angle_between(before[0][2], pose[2]))
+            if turned <= STEADY * (now - before[1]):
+                self._doors.see(pose, scan, now)
 
     def _publish(self, pose: Pose, stamp: float) -> None:
         """Tell `amcl_pose` where no other program does."""
