@@ -73,6 +73,7 @@ KNOWING_ROS = {
     'surveillance_controllers.motion.goal_execution',
     'surveillance_controllers.motion.holding',
     'surveillance_runtime.stop_keeper',
+    'surveillance_controllers.motion.door_teller',
     'surveillance_controllers.motion.nav2',
     'surveillance_controllers.motion.nav2_goals',
     'surveillance_controllers.motion.navigation_motion',

@@ -15,7 +15,6 @@ import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
 from state_machines.ros import CallInterruptedError, GoalCaller, GoalEnd
@@ -23,7 +22,6 @@ from surveillance_controllers.motion import nav2 as nav2_motion
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_interfaces.action import FollowPath
-from surveillance_interfaces.msg import DoorStates
 from surveillance_runtime.conversions import (
     map_message,
     point_messages,
@@ -269,35 +267,3 @@ def test_a_pose_that_was_heard_long_ago_is_not_believed_at_the_end(
     motion._pose, motion._heard_at = (8.0, 8.0, 0.0), time.monotonic() - 60.0
     servers.feedback = [at(2.9, 3.9)]
     assert tuple(motion.follow(PATH, run, lambda _: None)) == (2.9, 3.9, 0.0)
-
-
-@pytest.mark.parametrize('closed', [True, False])
-def test_doors_that_the_robot_sees_shut_are_told_where_nav2_drives(
-    graph: Any, servers: Servers, flat: Any, closed: bool
-) -> None:
-    told = graph.listen(DoorStates, 'door_states', STATE_QOS)
-    motion = nav2(graph, flat=flat)
-    reads: list[Any] = []
-    look = motion._doors.see
-    motion._doors.see = lambda *seen: (reads.append(seen), look(*seen))[1]  # type: ignore[assignment]
-    frames = graph.node.create_publisher(TFMessage, 'tf', 10)
-    scans = graph.node.create_publisher(LaserScan, 'scan', 10)
-    at = 2.0, 1.5, 0.3
-    message = TFMessage(transforms=[moved('map', 'odom', *at), moved('odom', 'base_link', 0, 0, 0)])
-    seen = flat.scan(at, closed=closed)
-    scan = LaserScan(
-        angle_min=-np.pi,
-        angle_increment=2 * np.pi / 180,
-        angle_max=np.pi - 2 * np.pi / 180,
-        range_max=8.0,
-        ranges=seen.ranges.astype(np.float32).tolist(),
-    )
-
-    def drive() -> bool:
-        frames.publish(message)
-        scan.header.stamp = graph.node.get_clock().now().to_msg()
-        scans.publish(scan)
-        return bool(told) if closed else len(reads) >= 30
-
-    graph.until(drive)
-    assert [each.closed for each in told[-1:]] == ([['D']] if closed else [])

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from lidar_navigation.localisation.mount_check import MountCheck as MountCheck
     from lidar_navigation.localisation.mount_check import MountFinding as MountFinding
     from lidar_navigation.localisation.place_locator import PlaceLocator as PlaceLocator
+    from lidar_navigation.localisation.true_odometry import TrueOdometry as TrueOdometry
     from lidar_navigation.planning.grid_planning import GridPlanner as GridPlanner
     from lidar_navigation.planning.grid_planning import NoPathError as NoPathError
     from lidar_navigation.planning.grid_planning import PlanningParameters as PlanningParameters
@@ -55,6 +56,7 @@ _HOME = {
     'PlaceLocator': 'localisation.place_locator',
     'PlanningParameters': 'planning.grid_planning',
     'Spin': 'driving.driving',
+    'TrueOdometry': 'localisation.true_odometry',
     'Velocity': 'driving.path_following',
 }
 __all__ = list(_HOME)

@@ -96,7 +96,7 @@ the scan was made."""
 
 
 @dataclass(frozen=True)
-class _Body:
+class _RadiusSetting:
     radius: float = robot_radius()
 
 
@@ -197,7 +197,9 @@ class Nav2Motion:
         )
         self._doors = DoorTeller(node, door_segments(node))
         self._seen_from: tuple[Pose, float] | None = None
-        self._lidar = ScanReader(node, node.declare_fields(_Body()).radius, self._frames.base)
+        self._lidar = ScanReader(
+            node, node.declare_fields(_RadiusSetting()).radius, self._frames.base
+        )
         self._lidar.subscribe(self._on_scan)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(POSE_PERIOD, self._look, clock=steady)

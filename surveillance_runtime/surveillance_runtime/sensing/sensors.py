@@ -14,8 +14,8 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Imu
 
+from lidar_navigation import TrueOdometry
 from lidar_navigation.geometry import Pose
-from lidar_navigation.localisation.true_odometry import TrueOdometry
 from surveillance_runtime.conversions import (
     frames_of_serialized,
     pose_of_serialized,
