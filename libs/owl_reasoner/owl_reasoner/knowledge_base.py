@@ -20,6 +20,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from owl_reasoner.derivation import Derivation
+from owl_reasoner.gc_control import uncollected
 from owl_reasoner.justification import Justifications
 from owl_reasoner.notifier import Changes, visible
 from owl_reasoner.owl.assertions import Assertions
@@ -81,8 +82,10 @@ class KnowledgeBase:
         self._derived = Derivation(self._told, self._budget)
         self._justifications = Justifications(self._told, self._derived)
         self.patience = math.inf
-        for axiom in axioms:
-            self._told.insert(axiom)
+        # 100,000 axioms are no garbage: the collector would walk them again and again.
+        with uncollected():
+            for axiom in axioms:
+                self._told.insert(axiom)
 
     # --- asserted axioms ---
 

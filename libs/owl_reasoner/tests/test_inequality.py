@@ -26,10 +26,12 @@ from owl_reasoner.owl.expressions import (
     ClassAtom,
     DifferentIndividualsAtom,
     ObjectComplementOf,
+    ObjectIntersectionOf,
     ObjectInverseOf,
     ObjectMaxCardinality,
     ObjectPropertyAtom,
 )
+from owl_reasoner.owl.vocabulary import NOTHING
 from owl_reasoner.reasoner.join_network import transitive
 from owl_reasoner.reasoner.translation import Translation
 
@@ -74,6 +76,7 @@ APART = Rule(
         ([], [differ(i, k), same(j, k)]),
         ([DisjointClasses((A, B))], [is_a(A, i), is_a(B, j)]),
         ([DisjointClasses((A, B)), SubClassOf(C, B)], [is_a(A, i), is_a(C, j)]),
+        ([SubClassOf(ObjectIntersectionOf((A, B)), NOTHING)], [is_a(A, i), is_a(B, j)]),
         ([], [is_a(ObjectComplementOf(A), i), is_a(A, j)]),
         ([IrreflexiveObjectProperty(P)], [rel(P, i, j)]),
         ([IrreflexiveObjectProperty(P)], [rel(P, j, i)]),

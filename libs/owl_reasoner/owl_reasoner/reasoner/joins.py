@@ -8,11 +8,11 @@ so compiled code is shared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from functools import lru_cache
 from types import CodeType
-from typing import Any
+from typing import Any, TypeVar
 
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.reasoner.clauses import (
@@ -30,6 +30,9 @@ from owl_reasoner.reasoner.clauses import (
 
 _EMPTY: frozenset[Any] = frozenset()
 _DEEPEST = 16
+_LATER = 1000
+"""The cost of an atom some of whose terms another one has to bind first."""
+T = TypeVar('T')
 
 
 @lru_cache(maxsize=4096)
@@ -56,6 +59,45 @@ class JoinContext:
     different_predicate: Predicate
     due: Callable[[], bool]
     looker: Callable[[Axiom | None], Callable[[], None]]
+
+
+def join_order(body: Iterable[T], bound: Set[Term], kind: Callable[[T], str | None]) -> Iterator[T]:
+    """Yield the atoms of a body, the one next that costs least by what is bound then.
+
+    Greedy, one atom at a time: bodies have two to five atoms, and sizes of tables change while the
+    order stays. What is bound decides more than how many facts there are.
+
+    Args:
+        body: Atoms of facts, of comparisons and of computations.
+        bound: The variables that are bound; whoever takes an atom adds its own.
+        kind: What facts make an atom true: 'class', 'object' or 'data'; None for no facts.
+    """
+    waiting = list(body)
+    while waiting:
+        atom = min(waiting, key=lambda one: _cost(one, bound, kind(one)))
+        waiting.remove(atom)
+        yield atom
+
+
+def _cost(atom: Any, bound: Set[Term], kind: str | None) -> int:
+    is_free = [isinstance(term, int) and term not in bound for term in atom.terms]
+    free = sum(is_free)
+    if kind is not None:
+        if free == 0:
+            return 0
+        if kind == 'class':
+            return 40
+        if free < len(is_free):
+            return 10
+        return 50 if kind == 'object' else 60
+    if free == 0:
+        return 1 if isinstance(atom, (SameAtom, RangeAtom)) else 2 + isinstance(atom, DifferentAtom)
+    solvable = isinstance(atom, ComputedAtom) and atom.solve is not None and is_free[0]
+    return 4 if free == 1 and (solvable or isinstance(atom, SameAtom)) else _LATER
+
+
+def _kind(atom: BodyAtom) -> str | None:
+    return atom.predicate.kind if isinstance(atom, PredicateAtom) else None
 
 
 class _Writer:
@@ -205,42 +247,13 @@ class _Writer:
         """Write all atoms, cheapest first; `early` may write more once it finds its variables
         bound.
         """
-        waiting = list(atoms)
         pending = early
-        while True:
+        for atom in join_order(atoms, self.bound, _kind):
             if pending is not None and pending():
                 pending = None
-            if not waiting:
-                return
-            # Greedy, one atom at a time: bodies have two to five atoms, and sizes of tables change
-            # while the code stays. What is bound decides more than how many facts there are.
-            atom = min(waiting, key=self._cost)
-            waiting.remove(atom)
             self.step(atom)
-
-    def _cost(self, atom: BodyAtom) -> int:
-        bound = sum(map(self.is_bound, atom.terms))
-        free = len(atom.terms) - bound
-        if isinstance(atom, PredicateAtom):
-            if free == 0:
-                return 0
-            if atom.predicate.kind == 'class':
-                return 40
-            if bound:
-                return 10
-            return 50 if atom.predicate.kind == 'object' else 60
-        if free == 0:
-            return (
-                1
-                if isinstance(atom, (SameAtom, RangeAtom))
-                else 2 + isinstance(atom, DifferentAtom)
-            )
-        if isinstance(atom, ComputedAtom):
-            solvable = atom.solve is not None and not self.is_bound(atom.terms[0])
-            return 4 if solvable and free == 1 else 1000
-        if isinstance(atom, SameAtom):
-            return 4 if bound else 1000
-        return 1000
+        if pending is not None:
+            pending()
 
     def finish(self, signature: str) -> Callable[..., Any]:
         parameters = ', '.join(f'o{number}' for number in range(len(self.objects)))

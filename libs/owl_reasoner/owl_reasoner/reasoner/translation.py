@@ -7,24 +7,21 @@ clause can express is reported, with the axiom, in `Program.unsupported`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
-from itertools import permutations, product
+from collections.abc import Callable, Iterable
+from itertools import product
 from typing import Any
 
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axiom_text import axiom_text, expression_text
 from owl_reasoner.owl.axioms import Axiom
-from owl_reasoner.owl.expressions import ClassExpression, Literal, PropertyExpression
+from owl_reasoner.owl.expressions import ClassExpression, PropertyExpression
 from owl_reasoner.owl.vocabulary import (
     BOTTOM,
     BOTTOM_DATA,
     NOTHING,
     OWL,
-    SWRLB,
     THING,
-    TOP_LITERAL,
     local_name,
 )
 from owl_reasoner.reasoner.budget import Budget
@@ -47,65 +44,26 @@ from owl_reasoner.reasoner.clauses import (
     SameAtom,
     Term,
     UnsupportedError,
-    closure,
     property_atom,
-    turned,
 )
 from owl_reasoner.reasoner.datatypes import value_of
+from owl_reasoner.reasoner.inclusions import (
+    PropertyHierarchy,
+    class_inclusions,
+    directed,
+    property_inclusions,
+)
 from owl_reasoner.reasoner.normal_form import is_positive, normal_form
-from owl_reasoner.reasoner.swrl_builtins import builtin
-from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, unfolded, value_set
-
-_Directed = tuple[str, bool]
-
-
-def directed(prop: PropertyExpression) -> _Directed:
-    """Return a property as (IRI, whether inverted)."""
-    return (prop, False) if isinstance(prop, str) else (prop.prop, True)
-
-
-def inclusions(axiom: Axiom) -> Iterator[tuple[_Directed, _Directed]]:
-    """Yield the pairs of properties, one included in the other, that an axiom states."""
-    if isinstance(axiom, (ax.SubObjectPropertyOf, ax.SubDataPropertyOf)):
-        yield directed(axiom.sub), directed(axiom.sup)
-    elif isinstance(axiom, (ax.EquivalentObjectProperties, ax.EquivalentDataProperties)):
-        yield from permutations(dict.fromkeys(map(directed, axiom.props)), 2)
-    elif isinstance(axiom, ax.InverseObjectProperties):
-        yield from permutations((directed(axiom.first), turned(directed(axiom.second))))
-    elif isinstance(axiom, ax.SymmetricObjectProperty):
-        yield directed(axiom.prop), turned(directed(axiom.prop))
-
-
-class PropertyHierarchy:
-    """The reflexive and transitive closure of the stated property inclusions."""
-
-    def __init__(self, axioms: Iterable[Axiom]) -> None:
-        self._above: dict[_Directed, set[_Directed]] = {}
-        self._functional: set[_Directed] = set()
-        for axiom in axioms:
-            for sub, sup in inclusions(axiom):
-                self._above.setdefault(sub, set()).add(sup)
-                self._above.setdefault(turned(sub), set()).add(turned(sup))
-            if isinstance(axiom, (ax.FunctionalObjectProperty, ax.FunctionalDataProperty)):
-                self._functional.add(directed(axiom.prop))
-            elif isinstance(axiom, ax.InverseFunctionalObjectProperty):
-                self._functional.add(turned(directed(axiom.prop)))
-
-    def above(self, prop: PropertyExpression) -> set[_Directed]:
-        """Return the property and everything it is included in."""
-        return set(closure(directed(prop), lambda one: self._above.get(one, ())))
-
-    def above_role(self, iri: str, inverted: bool) -> set[_Directed]:
-        """Return a directed property and everything it is included in."""
-        return self.above(ex.ObjectInverseOf(iri) if inverted else iri)
-
-    def is_functional(self, prop: PropertyExpression) -> bool:
-        """Tell whether an individual has at most one value, by this property or one above it."""
-        return not self._functional.isdisjoint(self.above(prop))
-
+from owl_reasoner.reasoner.rules import RuleTerms, computed_atom, safe_body
+from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, values_of
 
 Body = tuple[BodyAtom, ...]
 _X, _Y, _Z = 0, 1, 2
+_INCLUDING = (
+    *(ax.SubClassOf, ax.EquivalentClasses, ax.DisjointClasses, ax.DisjointUnion),
+    *(ax.ObjectPropertyDomain, ax.DataPropertyDomain, ax.ReflexiveObjectProperty),
+)
+"""Axioms that are translated as the inclusions of classes that they stand for."""
 _NEGATIVE = (
     ex.ObjectComplementOf,
     ex.ObjectAllValuesFrom,
@@ -122,61 +80,6 @@ _RELATING = (
     ex.DataMinCardinality,
     ex.DataHasValue,
 )
-
-
-class RuleTerms:
-    """Numbers a rule's variables by `fresh`; tells individuals from values."""
-
-    def __init__(self, fresh: Callable[[], int]) -> None:
-        self._fresh = fresh
-        self._numbers: dict[ex.Variable, int] = {}
-        self.individuals: set[int] = set()
-        self.values: set[int] = set()
-
-    def individual(self, argument: ex.IndividualArgument) -> Term:
-        """Return the term of an argument that is an individual."""
-        if isinstance(argument, ex.Variable):
-            number = self._number(argument)
-            self.individuals.add(number)
-            return number
-        return Constant(argument)
-
-    def value(self, argument: ex.DataArgument) -> Term:
-        """Return the term of an argument that is a value.
-
-        Raises:
-            UnsupportedError: It is neither a literal nor a variable.
-        """
-        if isinstance(argument, ex.Variable):
-            number = self._number(argument)
-            self.values.add(number)
-            return number
-        if not isinstance(argument, Literal):
-            raise UnsupportedError(f'{argument} stands where a literal or a variable is expected')
-        return Constant(value_of(argument), True)
-
-    def _number(self, variable: ex.Variable) -> int:
-        number = self._numbers.get(variable)
-        if number is None:
-            number = self._numbers[variable] = self._fresh()
-        return number
-
-
-def computed_atom(atom: ex.BuiltinAtom, terms: RuleTerms) -> ComputedAtom:
-    """Return a rule's built-in.
-
-    Raises:
-        UnsupportedError: It is not known.
-    """
-    name = atom.builtin.removeprefix(SWRLB)
-    known = builtin(name, len(atom.arguments)) if atom.builtin.startswith(SWRLB) else None
-    if known is None:
-        count = len(atom.arguments)
-        raise UnsupportedError(
-            f'the built-in {local_name(atom.builtin)} with {count} arguments is not supported'
-        )
-    holds, solve = known
-    return ComputedAtom(name, holds, solve, tuple(map(terms.value, atom.arguments)))
 
 
 class Translation:
@@ -328,15 +231,10 @@ class Translation:
             UnsupportedError: The range is not supported.
         """
         try:
-            data_range = unfolded(data_range, self._datatypes)
+            values = values_of(data_range, self._datatypes)
         except ValueError as error:
             raise UnsupportedError(str(error)) from None
-        if data_range == TOP_LITERAL:
-            return None
-        values = value_set(data_range)
-        if values is None:
-            raise UnsupportedError(f'the data range {expression_text(data_range)} is not supported')
-        return values
+        return None if values is EVERY else values
 
     # --- antecedents ---
 
@@ -626,28 +524,20 @@ class Translation:
     # --- axioms ---
 
     def _axiom(self, axiom: Axiom) -> None:
-        if isinstance(axiom, ax.SubClassOf):
-            self._sub_class(axiom.sub, axiom.sup)
-        elif isinstance(axiom, ax.EquivalentClasses):
-            for sub in axiom.classes:
-                for sup in axiom.classes:
-                    if sub is not sup:
-                        self._attempt(self._sub_class, sub, sup)
-        elif isinstance(axiom, ax.DisjointClasses):
-            self._all_disjoint(axiom.classes)
-        elif isinstance(axiom, ax.DisjointUnion):
-            self._all_disjoint(axiom.classes)
-            for part in axiom.classes:
-                self._attempt(self._sub_class, part, axiom.cls)
-            self._attempt(self._sub_class, axiom.cls, ex.ObjectUnionOf(axiom.classes))
-        elif isinstance(axiom, ax.Rule):
+        if isinstance(axiom, ax.Rule):
             self._rules.add(axiom)
         elif isinstance(axiom, ax.HasKey):
             self._key(axiom)
+        elif isinstance(axiom, _INCLUDING):
+            for inclusion in class_inclusions(axiom):
+                self._attempt(self._sub_class, *inclusion)
         elif not isinstance(axiom, (ax.Declaration, ax.DatatypeDefinition, ax.Import)):
             self._properties.add(axiom)
 
     def _sub_class(self, sub: ClassExpression, sup: ClassExpression) -> None:
+        if isinstance(sub, ex.ObjectIntersectionOf) and len(sub.operands) == 2 and sup == NOTHING:
+            self._disjoint_classes(*map(normal_form, sub.operands))
+            return
         sub, sup = normal_form(sub), normal_form(sup)
         if isinstance(sub, ex.ObjectUnionOf):
             for operand in sub.operands:
@@ -661,17 +551,15 @@ class Translation:
         for body in self.bodies(sub, _X):
             self.imply(body, sup, _X)
 
-    def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        for pair in ax.pairs_of(classes):
-            first, second = map(normal_form, pair)
-            if THING in (first, second):
-                self._attempt(self._sub_class, second if first == THING else first, NOTHING)
-            elif not is_positive(second):
-                self._attempt(self._sub_class, first, normal_form(second, True))
-            elif not is_positive(first):
-                self._attempt(self._sub_class, second, normal_form(first, True))
-            else:
-                self.disjoint(self._recognise(first), self._recognise(second))
+    def _disjoint_classes(self, first: ClassExpression, second: ClassExpression) -> None:
+        if THING in (first, second):
+            self._sub_class(second if first == THING else first, NOTHING)
+        elif not is_positive(second):
+            self._sub_class(first, normal_form(second, True))
+        elif not is_positive(first):
+            self._sub_class(second, normal_form(first, True))
+        else:
+            self.disjoint(self._recognise(first), self._recognise(second))
 
     def _key(self, axiom: ax.HasKey) -> None:
         props = [self._direction(prop) for prop in axiom.object_props]
@@ -691,17 +579,13 @@ class _PropertyAxioms:
         """Add the clauses of an axiom about properties."""
         data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
         link = self._data_link if data else self._object_link
-        for sub, sup in inclusions(axiom):
+        for sub, sup in property_inclusions(axiom):
             self._to.clause((link(*sub),), link(*sup))
         if isinstance(axiom, (ax.DisjointObjectProperties, ax.DisjointDataProperties)):
             data = isinstance(axiom, ax.DisjointDataProperties)
             self._disjoint_properties(axiom.props, self._data_link if data else self._object_link)
-        elif isinstance(axiom, ax.ObjectPropertyDomain):
-            self._to.imply((self._to.property(axiom.prop, _X, _Y),), axiom.domain, _X)
         elif isinstance(axiom, ax.ObjectPropertyRange):
             self._to.imply((self._to.property(axiom.prop, _X, _Y),), axiom.range, _Y)
-        elif isinstance(axiom, ax.DataPropertyDomain):
-            self._to.imply((self._data_link(axiom.prop),), axiom.domain, _X)
         elif isinstance(axiom, ax.DataPropertyRange):
             self._to.only((), axiom.prop, axiom.range)
         else:
@@ -716,8 +600,6 @@ class _PropertyAxioms:
         elif isinstance(axiom, ax.TransitiveObjectProperty):
             both = prop(axiom.prop, _X, _Y), prop(axiom.prop, _Y, _Z)
             self._to.clause(both, prop(axiom.prop, _X, _Z))
-        elif isinstance(axiom, ax.ReflexiveObjectProperty):
-            self._to.clause((), prop(axiom.prop, _X, _X))
         elif isinstance(axiom, ax.IrreflexiveObjectProperty):
             program.irreflexive.append(prop(axiom.prop, _X, _X).predicate)
             self._to.contradict((prop(axiom.prop, _X, _X),), _X)
@@ -792,57 +674,16 @@ class _Rules:
         return kind((first, second))
 
     def _bound(self, body: tuple[BodyAtom, ...], terms: RuleTerms) -> tuple[BodyAtom, ...]:
-        """Return the body, in which what stands in no fact is found by other means.
-
-        Such individuals are members of owl:Thing, such values are computed by a built-in. All other
-        built-ins only test: they take 3 and 3.0 as equal, the lookup of a computed value among the
-        facts would not, and the order of the join decides which of the two is done.
-
-        Raises:
-            UnsupportedError: A value is bound by nothing.
-        """
+        """Return the body; whoever stands in no fact of it is a member of owl:Thing."""
         program = self._to.program
-        bound: set[Term] = set()
-        computing: set[BodyAtom] = set()
-        for atom in body:
-            if isinstance(atom, PredicateAtom):
-                bound.update(atom.terms)
-        free = [
-            term
-            for atom in body
-            for term in atom.terms
-            if isinstance(term, int) and term in terms.individuals and term not in bound
-        ]
-        for term in dict.fromkeys(free):
+
+        def anybody(term: Term) -> BodyAtom:
             program.uses_thing = True
-            body = (*body, PredicateAtom(program.thing, (term,)))
-            bound.add(term)
-        # Range restriction (safety): by repetition, as one computed value may be what another one
-        # needs.
-        waiting = [atom for atom in body if isinstance(atom, (ComputedAtom, RangeAtom))]
-        progress = True
-        while waiting and progress:
-            progress = False
-            for atom in tuple(waiting):
-                unbound = [
-                    term for term in atom.terms if isinstance(term, int) and term not in bound
-                ]
-                if unbound == [atom.terms[0]] and isinstance(atom, ComputedAtom) and atom.solve:
-                    computing.add(atom)
-                    unbound = []
-                if not unbound:
-                    bound.update(atom.terms)
-                    waiting.remove(atom)
-                    progress = True
-        if waiting:
-            name = waiting[0].builtin if isinstance(waiting[0], ComputedAtom) else 'a data range'
-            raise UnsupportedError(f'an argument of {name} is bound by no other atom')
-        return tuple(
-            replace(atom, solve=None)
-            if isinstance(atom, ComputedAtom) and atom not in computing
-            else atom
-            for atom in body
-        )
+            return PredicateAtom(program.thing, (term,))
+
+        used = (term for atom in body for term in atom.terms)
+        individuals = [t for t in used if isinstance(t, int) and t in terms.individuals]
+        return safe_body(body, individuals, lambda atom: isinstance(atom, PredicateAtom), anybody)
 
     def _heads(self, rule: ax.Rule, body: tuple[BodyAtom, ...], terms: RuleTerms) -> None:
         bound = {term for atom in body for term in atom.terms if isinstance(term, int)}

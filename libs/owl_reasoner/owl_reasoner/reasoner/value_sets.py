@@ -20,6 +20,7 @@ from functools import cache, cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 from owl_reasoner.owl import expressions as ex
+from owl_reasoner.owl.axiom_text import expression_text
 from owl_reasoner.owl.expressions import DataRange
 from owl_reasoner.owl.vocabulary import OWL, RDF, TOP_LITERAL, XSD, local_name
 from owl_reasoner.reasoner.datatypes import (
@@ -633,6 +634,19 @@ def _combined(sets: Iterator[ValueSet], any_of: bool) -> ValueSet:
     for other in sets:
         result = result | other if any_of else result & other
     return result
+
+
+def values_of(data_range: DataRange, definitions: Mapping[str, DataRange]) -> ValueSet:
+    """Return the values of a data range, with the ranges of the datatypes that are defined.
+
+    Raises:
+        ValueError: A datatype is defined by itself, or the range is not supported.
+    """
+    data_range = unfolded(data_range, definitions)
+    found = value_set(data_range)
+    if found is None:
+        raise ValueError(f'the data range {expression_text(data_range)} is not supported')
+    return found
 
 
 def unfolded(

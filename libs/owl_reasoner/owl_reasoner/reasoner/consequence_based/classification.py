@@ -38,9 +38,10 @@ from owl_reasoner.reasoner.clauses import (
 )
 from owl_reasoner.reasoner.consequence_based.contexts import Context, Contexts
 from owl_reasoner.reasoner.consequence_based.rule_index import Role, Token, Tokens
+from owl_reasoner.reasoner.inclusions import directed
 from owl_reasoner.reasoner.property_chains import report_counted_chains, spell_out_chains
 from owl_reasoner.reasoner.simplify import drop_implied_atoms, simplify
-from owl_reasoner.reasoner.translation import Translation, directed
+from owl_reasoner.reasoner.translation import Translation
 from owl_reasoner.reasoner.value_sets import ValueSet
 
 _X, _Y = 0, 1

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, permutations
+from itertools import combinations
 from typing import TypeAlias
 
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom
-from owl_reasoner.owl.expressions import ClassExpression
-from owl_reasoner.owl.vocabulary import THING, TOP_LITERAL
 from owl_reasoner.reasoner.clauses import UnsupportedError, turned
 from owl_reasoner.reasoner.hypertableau.dl_clauses import FRESH
+from owl_reasoner.reasoner.inclusions import class_inclusions, directed, property_inclusions
 from owl_reasoner.reasoner.property_chains import AnyRole
-from owl_reasoner.reasoner.translation import directed, inclusions
 
 _A, _B = FRESH + 'someone', FRESH + 'another'
 Denial: TypeAlias = tuple[Axiom, ...]
@@ -33,18 +31,7 @@ def denials(goal: Axiom) -> Iterator[Denial]:
         UnsupportedError: The axiom is a key, a rule or a datatype definition, or compares data
             properties.
     """
-    if isinstance(goal, ax.SubClassOf):
-        yield (_member(goal.sub, ex.ObjectComplementOf(goal.sup)),)
-    elif isinstance(goal, ax.EquivalentClasses):
-        for sub, sup in permutations(goal.classes, 2):
-            yield (_member(sub, ex.ObjectComplementOf(sup)),)
-    elif isinstance(goal, ax.DisjointClasses):
-        yield from ((_member(*pair),) for pair in ax.pairs_of(goal.classes))
-    elif isinstance(goal, ax.DisjointUnion):
-        whole, parts = goal.cls, ex.ObjectUnionOf(goal.classes)
-        yield from denials(ax.EquivalentClasses((whole, parts)))
-        yield from denials(ax.DisjointClasses(goal.classes))
-    elif isinstance(goal, ax.ClassAssertion):
+    if isinstance(goal, ax.ClassAssertion):
         yield (ax.ClassAssertion(ex.ObjectComplementOf(goal.cls), goal.individual),)
     elif isinstance(goal, ax.SameIndividual):
         for pair in combinations(sorted(goal.individuals), 2):
@@ -66,7 +53,7 @@ def denials(goal: Axiom) -> Iterator[Denial]:
 
 def _property_denials(goal: Axiom) -> Iterator[Denial]:
     if isinstance(goal, _INCLUSIONS):
-        for sub, sup in inclusions(goal):
+        for sub, sup in property_inclusions(goal):
             yield _holds(sub), _fails(sup)
     elif isinstance(goal, ax.AsymmetricObjectProperty):
         role = directed(goal.prop)
@@ -81,37 +68,13 @@ def _property_denials(goal: Axiom) -> Iterator[Denial]:
     elif isinstance(goal, ax.DisjointObjectProperties):
         for one, other in ax.pairs_of(goal.props):
             yield _holds(directed(one)), _holds(directed(other))
-    elif isinstance(goal, ax.FunctionalObjectProperty):
-        yield (_member(ex.ObjectMinCardinality(2, goal.prop)),)
-    elif isinstance(goal, ax.InverseFunctionalObjectProperty):
-        prop = goal.prop
-        back = ex.ObjectInverseOf(prop) if isinstance(prop, str) else prop.prop
-        yield (_member(ex.ObjectMinCardinality(2, back)),)
-    elif isinstance(goal, ax.ReflexiveObjectProperty):
-        yield (_member(ex.ObjectComplementOf(ex.ObjectHasSelf(goal.prop))),)
-    elif isinstance(goal, ax.IrreflexiveObjectProperty):
-        yield (_member(ex.ObjectHasSelf(goal.prop)),)
-    elif isinstance(goal, ax.ObjectPropertyDomain):
-        some = ex.ObjectSomeValuesFrom(goal.prop, THING)
-        yield (_member(some, ex.ObjectComplementOf(goal.domain)),)
-    elif isinstance(goal, ax.ObjectPropertyRange):
-        yield (_member(ex.ObjectSomeValuesFrom(goal.prop, ex.ObjectComplementOf(goal.range))),)
-    elif isinstance(goal, ax.FunctionalDataProperty):
-        yield (_member(ex.DataMinCardinality(2, goal.prop)),)
-    elif isinstance(goal, ax.DataPropertyDomain):
-        value = ex.DataSomeValuesFrom(goal.prop, TOP_LITERAL)
-        yield (_member(value, ex.ObjectComplementOf(goal.domain)),)
-    elif isinstance(goal, ax.DataPropertyRange):
-        outside = ex.DataComplementOf(goal.range)
-        yield (_member(ex.DataSomeValuesFrom(goal.prop, outside)),)
     else:
-        raise UnsupportedError(f'an axiom of the kind {type(goal).__name__}')
-
-
-def _member(*classes: ClassExpression) -> ax.ClassAssertion:
-    """Somebody is in all classes."""
-    cls = classes[0] if len(classes) == 1 else ex.ObjectIntersectionOf(classes)
-    return ax.ClassAssertion(cls, _A)
+        included = list(class_inclusions(goal))
+        if not included and not isinstance(goal, ax.EquivalentClasses | ax.DisjointClasses):
+            raise UnsupportedError(f'an axiom of the kind {type(goal).__name__}')
+        for low, high in included:
+            both = ex.ObjectIntersectionOf((low, ex.ObjectComplementOf(high)))
+            yield (ax.ClassAssertion(both, _A),)
 
 
 def _holds(role: AnyRole, one: str = _A, other: str = _B) -> Axiom:

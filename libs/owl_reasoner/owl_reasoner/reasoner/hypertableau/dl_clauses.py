@@ -28,13 +28,13 @@ from owl_reasoner.owl.vocabulary import (
     THING,
     TOP,
     TOP_DATA,
-    TOP_LITERAL,
 )
 from owl_reasoner.reasoner.budget import Budget
 from owl_reasoner.reasoner.clauses import (
     ComputedAtom,
     Constant,
     DifferentAtom,
+    RangeAtom,
     SameAtom,
     Term,
     UnsupportedError,
@@ -42,13 +42,10 @@ from owl_reasoner.reasoner.clauses import (
     turned,
 )
 from owl_reasoner.reasoner.hypertableau.roles import Roles
+from owl_reasoner.reasoner.inclusions import class_inclusions, directed
 from owl_reasoner.reasoner.normal_form import normal_form
-from owl_reasoner.reasoner.translation import (
-    RuleTerms,
-    computed_atom,
-    directed,
-)
-from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, unfolded, value_set
+from owl_reasoner.reasoner.rules import RuleTerms, computed_atom, safe_body
+from owl_reasoner.reasoner.value_sets import EVERY, ValueSet, values_of
 
 _X, _Y = 0, 1
 Heads = tuple[tuple[int, int], ...]
@@ -138,17 +135,10 @@ class OfProp(NamedTuple):
     terms: tuple[Term, Term]
 
 
-class OfRange(NamedTuple):
-    """A value is in a set."""
-
-    values: ValueSet
-    terms: tuple[Term]
-
-
 FactAtom: TypeAlias = OfConcept | OfRole | OfChain | OfProp
 Asked: TypeAlias = 'int | str | tuple[str, int]'
 """A concept, a data property, or with 'role' before it a role."""
-NamedAtom: TypeAlias = FactAtom | OfRange | SameAtom | DifferentAtom | ComputedAtom
+NamedAtom: TypeAlias = FactAtom | RangeAtom | SameAtom | DifferentAtom | ComputedAtom
 
 
 @dataclass(frozen=True, slots=True)
@@ -388,11 +378,9 @@ class DLClauses:
     def values(self, data_range: ex.DataRange) -> ValueSet:
         """Return the values of a data range."""
         try:
-            found = value_set(unfolded(data_range, self._datatypes))
+            found = values_of(data_range, self._datatypes)
         except ValueError as error:
             raise UnsupportedError(str(error)) from None
-        if found is None:
-            raise UnsupportedError('a data range is not supported')
         if not found.decided:
             subject = f'assertions with {expression_text(data_range)}'
             if self._origin is not None:
@@ -527,39 +515,15 @@ class DLClauses:
             self.value_rule(BOTTOM_DATA, _ALL, EVERY, ())
 
     def _axiom(self, axiom: Axiom) -> None:
-        if isinstance(axiom, ax.SubClassOf):
-            self.include(axiom.sub, axiom.sup)
-        elif isinstance(axiom, ax.EquivalentClasses):
-            for sub in axiom.classes:
-                for sup in axiom.classes:
-                    if sub is not sup:
-                        self.include(sub, sup)
-        elif isinstance(axiom, ax.DisjointClasses):
-            self._all_disjoint(axiom.classes)
-        elif isinstance(axiom, ax.DisjointUnion):
-            self._all_disjoint(axiom.classes)
-            for part in axiom.classes:
-                self.include(part, axiom.cls)
-            self.include(axiom.cls, ex.ObjectUnionOf(axiom.classes))
-        elif isinstance(axiom, ax.HasKey):
+        if isinstance(axiom, ax.HasKey):
             self._named_rules.key(axiom)
         elif isinstance(axiom, ax.Rule):
             self._named_rules.rule(axiom)
         else:
             self._property_axiom(axiom)
 
-    # --- rules about named individuals ---
-
-    def _all_disjoint(self, classes: tuple[ClassExpression, ...]) -> None:
-        for pair in ax.pairs_of(classes):
-            self.node_rule(frozenset(map(self.recognised, pair)), ())
-
     def _property_axiom(self, axiom: Axiom) -> None:
-        if isinstance(axiom, ax.ReflexiveObjectProperty):
-            self.node_rule(_ALL, ((_X, self.loop(axiom.prop)),))
-        elif isinstance(axiom, ax.IrreflexiveObjectProperty):
-            self.node_rule(frozenset((self.mark(axiom.prop),)), ())
-        elif isinstance(axiom, ax.AsymmetricObjectProperty):
+        if isinstance(axiom, ax.AsymmetricObjectProperty):
             role = self.roles.number(axiom.prop)
             self._exclude(role, -role)
         elif isinstance(axiom, ax.DisjointObjectProperties):
@@ -574,14 +538,6 @@ class DLClauses:
             if isinstance(axiom, ax.InverseFunctionalObjectProperty):
                 role, self.roles.has_inverse = -role, True
             self.functional.append(Count(1, role, ANYBODY))
-        elif isinstance(axiom, ax.ObjectPropertyDomain):
-            self.include(ex.ObjectSomeValuesFrom(axiom.prop, THING), axiom.domain)
-        elif isinstance(axiom, ax.ObjectPropertyRange):
-            self.include(THING, ex.ObjectAllValuesFrom(axiom.prop, axiom.range))
-        elif isinstance(axiom, ax.DataPropertyDomain):
-            self.include(ex.DataSomeValuesFrom(axiom.prop, TOP_LITERAL), axiom.domain)
-        elif isinstance(axiom, ax.DataPropertyRange):
-            self.include(THING, ex.DataAllValuesFrom(axiom.prop, axiom.range))
         elif isinstance(axiom, ax.FunctionalDataProperty):
             if axiom.prop == TOP_DATA:
                 self.node_rule(_ALL, ())
@@ -590,6 +546,9 @@ class DLClauses:
             for name, other in ax.pairs_of(axiom.props):
                 self.disjoint_props.setdefault(name, {})[other] = None
                 self.disjoint_props.setdefault(other, {})[name] = None
+        else:
+            for inclusion in class_inclusions(axiom):
+                self.include(*inclusion)
 
     def _exclude(self, first: int, second: int) -> None:
         for one, other in ((first, second), (-first, -second)):
@@ -645,7 +604,7 @@ class _NamedRules:
                     OfConcept(self._rules.recognised(atom.cls), (individual(atom.argument),))
                 )
             elif isinstance(atom, ex.DataRangeAtom):
-                body.append(OfRange(self._rules.values(atom.range), (value(atom.argument),)))
+                body.append(RangeAtom(self._rules.values(atom.range), (value(atom.argument),)))
             elif isinstance(atom, ex.ObjectPropertyAtom):
                 body.append(self._link(atom.prop, individual(atom.first), individual(atom.second)))
             elif isinstance(atom, ex.DataPropertyAtom):
@@ -659,34 +618,23 @@ class _NamedRules:
                 is_same = isinstance(atom, ex.SameIndividualAtom)
                 body.append(SameAtom(pair) if is_same else DifferentAtom(pair))
         heads = [self._head(atom, terms) for atom in rule.head]
-        facts = [atom for atom in body if isinstance(atom, FactAtom)]
-        bound = {term for atom in facts for term in atom.terms}
         in_body = dict.fromkeys(term for atom in body for term in atom.terms)
         in_heads = [term for atom in heads for term in atom.terms]
         if any(isinstance(term, int) and term not in in_body for term in in_heads):
             raise UnsupportedError('a variable of the head does not stand in the body')
-        for term in dict.fromkeys((*in_body, *in_heads)):
-            if isinstance(term, Constant) and not term.is_value:
-                self._rules.nominal(str(term.value))
-            elif term not in terms.individuals:
-                continue
-            if term not in bound:
-                body.append(OfConcept(ANYBODY, (term,)))
-        if not any(isinstance(atom, FactAtom) for atom in body):
+        named = [t for t in (*in_body, *in_heads) if isinstance(t, Constant) and not t.is_value]
+        for term in named:
+            self._rules.nominal(str(term.value))
+        individuals: list[Term] = [*named, *(t for t in in_body if t in terms.individuals)]
+        safe = safe_body(
+            body,
+            individuals,
+            lambda atom: isinstance(atom, FactAtom),
+            lambda term: OfConcept(ANYBODY, (term,)),
+        )
+        if not any(isinstance(atom, FactAtom) for atom in safe):
             raise UnsupportedError('it is about no individual')
-        self._check_values(body, terms.values)
-        self._rules.named += [NamedRule(tuple(body), head, rule) for head in heads or (None,)]
-
-    def _check_values(self, body: list[NamedAtom], terms: Iterable[Term]) -> None:
-        """Raise UnsupportedError where a variable has no value by facts or computation."""
-        bound = {term for atom in body if isinstance(atom, FactAtom) for term in atom.terms}
-        computing = [atom for atom in body if isinstance(atom, ComputedAtom) and atom.solve]
-        for _ in computing:
-            for first, *rest in (atom.terms for atom in computing):
-                if all(isinstance(term, Constant) or term in bound for term in rest):
-                    bound.add(first)
-        if any(isinstance(term, int) and term not in bound for term in terms):
-            raise UnsupportedError('a variable is bound by no other atom')
+        self._rules.named += [NamedRule(safe, head, rule) for head in heads or (None,)]
 
     def _head(self, atom: ex.Atom, terms: RuleTerms) -> OfConcept | OfRole | OfProp | Any:
         """Return what a rule says of those of whom its body holds."""

@@ -12,8 +12,8 @@ from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import PropertyExpression
 from owl_reasoner.owl.vocabulary import TOP_DATA
 from owl_reasoner.reasoner.clauses import UnsupportedError, closure, turned
+from owl_reasoner.reasoner.inclusions import directed, property_inclusions
 from owl_reasoner.reasoner.property_chains import AnyRole, Chains
-from owl_reasoner.reasoner.translation import directed, inclusions
 
 
 class Roles:
@@ -98,7 +98,7 @@ class Roles:
             UnsupportedError: Nobody can decide with it.
         """
         data = isinstance(axiom, (ax.SubDataPropertyOf, ax.EquivalentDataProperties))
-        for sub, sup in inclusions(axiom):
+        for sub, sup in property_inclusions(axiom):
             if data:
                 if sub[0] == TOP_DATA:
                     raise UnsupportedError('owl:topDataProperty is below another property')

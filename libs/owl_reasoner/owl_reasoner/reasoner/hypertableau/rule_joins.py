@@ -20,6 +20,7 @@ from owl_reasoner.reasoner.clauses import (
     ComputedAtom,
     Constant,
     DifferentAtom,
+    RangeAtom,
     SameAtom,
     Term,
 )
@@ -33,7 +34,6 @@ from owl_reasoner.reasoner.hypertableau.dl_clauses import (
     OfChain,
     OfConcept,
     OfProp,
-    OfRange,
     OfRole,
 )
 from owl_reasoner.reasoner.hypertableau.model import (
@@ -50,12 +50,11 @@ from owl_reasoner.reasoner.hypertableau.model import (
     Valued,
     still_open,
 )
+from owl_reasoner.reasoner.joins import join_order
 from owl_reasoner.reasoner.value_sets import NONE, ValueSet, point, value_set
 
 MOST_TRIED = 300
 """Where so many values are possible, each of them is tried."""
-_LATER = 1000
-"""The cost of a test, or a computation, some of whose terms another atom has to bind first."""
 _FEW = 4
 """So many holders of a property are looked at before a join with its values."""
 _MOST_VALUES = 20_000
@@ -272,7 +271,7 @@ class CaseJoins:
 
     def _ways(self, atom: NamedAtom, match: _Match) -> Iterator[_Match]:
         """Return the ways in which an atom holds."""
-        if isinstance(atom, OfRange):
+        if isinstance(atom, RangeAtom):
             yield from self._within(match, match.given[atom.terms[0]], atom.values)
         elif isinstance(atom, ComputedAtom):
             yield from self._computed(atom, match)
@@ -506,26 +505,21 @@ class _Plan(NamedTuple):
 
 
 def _ordered(body: Iterable[NamedAtom], given: FactAtom) -> tuple[NamedAtom, ...]:
-    """Return the other atoms of a body, each after those that bind its terms, tests at once."""
-    waiting = [atom for atom in body if atom is not given]
-    bound = {term for term in given.terms if isinstance(term, int)}
+    """Return the other atoms of a body, each after those that bind its terms."""
+    bound: set[Term] = {term for term in given.terms if isinstance(term, int)}
     order: list[NamedAtom] = []
-
-    def cost(atom: NamedAtom) -> int:
-        free = [isinstance(term, int) and term not in bound for term in atom.terms]
-        if isinstance(atom, FactAtom):
-            return 50 if all(free) else 10 * sum(free)
-        if not any(free):
-            return 1
-        computes = isinstance(atom, ComputedAtom) and atom.solve is not None
-        return 100 if computes and not any(free[1:]) else _LATER
-
-    while waiting:
-        atom = min(waiting, key=cost)
-        waiting.remove(atom)
+    for atom in join_order((atom for atom in body if atom is not given), bound, _kind):
         order.append(atom)
         bound.update(term for term in atom.terms if isinstance(term, int))
     return tuple(order)
+
+
+def _kind(atom: NamedAtom) -> str | None:
+    if isinstance(atom, OfConcept):
+        return 'class'
+    if isinstance(atom, OfProp):
+        return 'data'
+    return 'object' if isinstance(atom, FactAtom) else None
 
 
 def compared(atom: ComputedAtom, value: Term) -> ValueSet | None:
