@@ -90,7 +90,9 @@ class Workspace:
 
     def warn(self, text: str) -> None:
         """Write a line for the operator."""
-        self._warn(one_line(text))
+        # The line may go to a file on the disk that is full.
+        with contextlib.suppress(OSError):
+            self._warn(one_line(text))
 
     def watch(self, watcher: Watcher) -> None:
         """Tell a watcher of every change of asserted and derived facts.

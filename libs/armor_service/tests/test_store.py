@@ -424,6 +424,37 @@ def test_a_copy_is_whole_while_the_service_runs(server: Server, tmp_path: Path) 
     assert 'expected a name that ends in .sqlite3' in refused.error_description
 
 
+def test_a_copy_says_what_it_lacks_while_another_program_has_the_file(server: Server) -> None:
+    with closing(sqlite3.connect(server.path, isolation_level=None)) as other:
+        other.execute('BEGIN IMMEDIATE')
+        server.ask('ADD IND CLASS', 'A', 'DOOR')
+        copied = server.ask('BACKUP', 'copy.sqlite3')
+        assert copied.success
+        lacks = 'the copy lacks 1 changes that wait to be written: database is locked'
+        assert copied.error_description == lacks
+        other.execute('ROLLBACK')
+
+
+def test_a_full_disk_behind_a_locked_file_loses_nothing_once_both_are_over(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with closing(sqlite3.connect(server.path, isolation_level=None)) as other:
+        other.execute('BEGIN IMMEDIATE')
+        server.ask('ADD IND CLASS', 'A', 'DOOR')
+        with monkeypatch.context() as patch:
+            patch.setattr(Spill, 'append', full)
+            # What tells it goes to a file on the same disk.
+            patch.setattr(server.service.workspace, '_warn', full)
+            server.ask('ADD IND CLASS', 'B', 'DOOR')
+        # There is room again, and the file is still locked: a death keeps both.
+        server.ask('ADD IND CLASS', 'C', 'DOOR')
+        kept = server.path.with_suffix('.spill').read_bytes()
+        assert all(f'#{name}'.encode() in kept for name in 'ABC')
+        other.execute('ROLLBACK')
+    server.restart()
+    assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
+
+
 WRITER = """
 import sys
 from pathlib import Path

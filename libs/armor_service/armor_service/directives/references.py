@@ -234,7 +234,8 @@ def _save(workspace: Workspace, request: DirectiveRequest, path: str) -> Directi
     text('path'),
     native=False,
     summary='Writes a copy of the World of the reference, as of now, to a file below the '
-    'ontologies folder that ends in .sqlite3. Only where the service keeps references.',
+    'ontologies folder that ends in .sqlite3. Only where the service keeps references. The '
+    'description says what the copy lacks while another program keeps the World locked.',
     slow=True,
 )
 def _backup(workspace: Workspace, request: DirectiveRequest, path: str) -> DirectiveResponse:
@@ -242,8 +243,8 @@ def _backup(workspace: Workspace, request: DirectiveRequest, path: str) -> Direc
         name = ref.name
     if workspace.store is None:
         raise DirectiveError('BACKUP: the service keeps no references; SAVE writes one')
-    workspace.store.backup(name, workspace.paths.to_write(path, WORLD_ENDINGS))
-    return DirectiveResponse()
+    lacks = workspace.store.backup(name, workspace.paths.to_write(path, WORLD_ENDINGS))
+    return DirectiveResponse(error_description=lacks)
 
 
 def _loaded_file(workspace: Workspace, ref: Reference) -> str:

@@ -194,15 +194,20 @@ class Store:
         if self._synced and (file := self._files.get(name)) is not None:
             file.sync()
 
-    def backup(self, name: str, target: Path) -> None:
+    def backup(self, name: str, target: Path) -> str:
         """Write a copy of a reference's file, as of now.
+
+        Returns:
+            What the copy lacks, because the file could not be written; empty: nothing.
 
         Raises:
             StoreError: It cannot be written.
         """
-        file = self._files[name]
+        file = self._files.get(name)
+        if file is None:
+            raise StoreError(f'{name} was dropped meanwhile')
         try:
-            file.backup(target)
+            return file.backup(target)
         except OSError as error:
             raise StoreError(f'{target}: {error.strerror}') from None
         except sqlite3.Error as error:

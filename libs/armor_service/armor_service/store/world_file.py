@@ -446,6 +446,10 @@ class WorldFile:
         with suppress(OSError):
             self._spill.clear()
         self.commit()
+        if len(self.ref.kb) > LARGE and self._db is not None and not self._failure:
+            # Indices that were filled in any order take twice the room. It may wait for others.
+            with suppress(sqlite3.Error):
+                self._db.execute('VACUUM')
 
     def commit(self) -> None:
         """Write what changed, as one transaction; into the spill where that cannot be."""
@@ -885,8 +889,11 @@ class WorldFile:
                 with closing(sqlite3.connect(self.path, timeout=0.0)) as db:
                     db.execute('PRAGMA wal_checkpoint(PASSIVE)')
 
-    def backup(self, target: Path) -> None:
+    def backup(self, target: Path) -> str:
         """Write a copy of the file as it is now; without a lock.
+
+        Returns:
+            What the copy lacks; empty: nothing.
 
         Raises:
             OSError: It cannot be written.
@@ -903,6 +910,9 @@ class WorldFile:
             new.rename(target)
         finally:
             new.unlink(missing_ok=True)
+        if not self._failure:
+            return ''
+        return f'the copy lacks {self.waiting} changes that wait to be written: {self._failure}'
 
     def remove(self) -> None:
         """Remove the file and what is beside it."""
