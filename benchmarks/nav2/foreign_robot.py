@@ -71,7 +71,6 @@ class ForeignRobot(Node):
         self._silent_until = -math.inf
         self._stepped_at = time.monotonic()
         self._way = 0.0
-        self._has_dock = options.dock
         self._map_to_odom = None
         self._tf = self.create_publisher(TFMessage, 'tf', 100)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -80,7 +79,9 @@ class ForeignRobot(Node):
         if not options.tf_only:
             self._odometry = self.create_publisher(Odometry, 'odom', 10)
         self._scans = self.create_publisher(LaserScan, 'scan', SENSOR_QOS)
-        self._battery = self.create_publisher(BatteryState, 'battery_state', 10)
+        if options.dock:
+            self._battery = self.create_publisher(BatteryState, 'battery_state', 10)
+            self.create_timer(1.0, self._tell_battery)
         self.create_subscription(TwistStamped, 'cmd_vel', self._on_command, 10)
         self.create_subscription(String, 'stage', self._on_stage, 10)
         self.create_subscription(TFMessage, 'tf', self._on_transforms, 100)
@@ -95,7 +96,6 @@ class ForeignRobot(Node):
         self.create_timer(STEP, self._step)
         self.create_timer(SWEEP, self._sweep)
         self.create_timer(TRACE, self._write)
-        self.create_timer(1.0, self._tell_battery)
 
     def _frame(self, parent: str, child: str, pose: Any) -> TransformStamped:
         frame = TransformStamped(child_frame_id=child)
@@ -215,8 +215,7 @@ class ForeignRobot(Node):
     def _tell_battery(self) -> None:
         status = BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
         x, y, _ = self.robot.base.pose
-        at_dock = math.dist((x, y), self.robot.world.plan.start[:2]) < CONTACT
-        charges = self._has_dock and at_dock
+        charges = math.dist((x, y), self.robot.world.plan.start[:2]) < CONTACT
         if charges:
             status = BatteryState.POWER_SUPPLY_STATUS_CHARGING
         message = BatteryState(percentage=0.8, voltage=12.3, power_supply_status=status)
