@@ -29,6 +29,8 @@ SERVERS = (
 """Package, program, node."""
 CHAIN = ('velocity_smoother', 'collision_monitor')
 """Between the controller and the base."""
+MANAGED = 'localization', 'navigation'
+"""What each of the two lifecycle managers brings up."""
 LOCALIZERS = ('map_server', 'amcl')
 RPP = {
     'plugin': 'nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController',
@@ -132,11 +134,22 @@ class Nav2Stack:
 
     def start(self) -> None:
         """Start all; the managers bring them up by and by."""
+        for name in MANAGED:
+            (self._folder / f'lifecycle_manager_{name}.log').unlink(missing_ok=True)
         for package, program, node in self._there:
             self.start_one(package, program, node)
-        for name in ('localization', 'navigation'):
+        for name in MANAGED:
             node = f'lifecycle_manager_{name}'
             self.start_one('nav2_lifecycle_manager', 'lifecycle_manager', node)
+
+    def is_active(self) -> bool:
+        """Tell whether both managers have brought up all that was started last."""
+        return all(
+            (self._folder / f'lifecycle_manager_{name}.log')
+            .read_text('utf-8', 'replace')
+            .count('Managed nodes are active')
+            for name in MANAGED
+        )
 
     def start_one(self, package: str, program: str, node: str) -> None:
         """Start one server."""
