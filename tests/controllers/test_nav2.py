@@ -6,6 +6,7 @@ Their messages, nav2_msgs, come with them and are no wheel, so classes stand in 
 
 from __future__ import annotations
 
+import itertools
 import time
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +20,7 @@ from tf2_msgs.msg import TFMessage
 
 from state_machines.ros import CallInterruptedError, GoalCaller, GoalEnd
 from surveillance_controllers.motion import nav2 as nav2_motion
+from surveillance_controllers.motion import pose_doubt
 from surveillance_controllers.motion.arrival import MotionFailedError
 from surveillance_controllers.motion_controller_node import MotionController
 from surveillance_interfaces.action import FollowPath
@@ -258,6 +260,49 @@ def test_where_nobody_tells_a_pose_the_frames_tell_it(
     # It is fresh, and beats what Nav2 said on the way.
     servers.feedback = [at(1, 0)]
     assert tuple(motion.follow(PATH, run, lambda _: None)) == pytest.approx((9.0, 2.0, 0.0))
+
+
+def test_a_pose_that_the_lidar_contradicts_is_told_of_and_no_visit_is_believed(
+    graph: Any, servers: Servers, flat: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pose_doubt, 'AFTER', 0.0)
+    monkeypatch.setattr(nav2_motion, 'LOOK_AT_SCANS', 0.0)
+    said = graph.said()
+    recorder = Recorder()
+    motion = nav2(graph, recorder, flat)
+    maps = graph.node.create_publisher(OccupancyGrid, 'map', STATE_QOS)
+    frames = graph.node.create_publisher(TFMessage, 'tf', 10)
+    maps.publish(map_message(flat.grid, 'map', Time()))
+    scan = flat.scan((2.0, 1.5, 0.0))
+    clock = itertools.count(6)
+
+    def tell(x: float, stamp: Time) -> None:
+        links = [moved('map', 'odom', 0.0, 0.0, 0.0), moved('odom', 'base_link', x, 1.5, 0.0)]
+        for link in links:
+            link.header.stamp = stamp
+        frames.publish(TFMessage(transforms=links))
+        graph.until(lambda: motion._trace.is_past(stamp.sec + 1e-9 * stamp.nanosec))
+
+    def seen_from(x: float) -> None:
+        for _ in range(2):
+            second = next(clock)
+            tell(x, Time(sec=second))
+            header = SimpleNamespace(stamp=Time(sec=second, nanosec=200_000_000))
+            motion._on_scan('scan', scan, SimpleNamespace(header=header))
+            tell(x, Time(sec=second, nanosec=400_000_000))
+
+    graph.until(lambda: motion._doubt._fit)
+    seen_from(2.0)
+    graph.until(lambda: recorder.places[-1:] == ['A'])
+    seen_from(5.5)
+    words = '(5.5, 1.5), does not fit what the lidar sees'
+    graph.until(lambda: any(words in line for line in said))
+    end = np.array([5.5, 1.5, 0.0])
+    with pytest.raises(MotionFailedError, match='does not fit'):
+        motion.place_reached(end, end)
+    seen_from(2.0)
+    graph.until(lambda: any('the pose fits what the lidar sees' in line for line in said))
+    assert motion.place_reached(np.array([2.0, 1.5, 0.0]), np.array([2.0, 1.5, 0.0])) == 'A'
 
 
 def test_a_pose_that_was_heard_long_ago_is_not_believed_at_the_end(

@@ -6,7 +6,8 @@ A path that only says where to turn (`spin_in_place`) becomes a Spin goal.
 
 Where the robot is, `map -> odom -> base` on `tf` says, else `amcl_pose`. Where no other program
 tells `amcl_pose` (slam_toolbox, RTAB-Map, Cartographer), this one does, from `tf`: planner, battery
-and page read it. From there its scans show which doors are shut.
+and page read it. From there its scans show which doors are shut. A pose that does not fit what the
+lidar sees is told of, and no visit is believed.
 """
 
 from __future__ import annotations
@@ -56,6 +57,7 @@ from surveillance_controllers.motion.nav2_goals import (
     reason_of,
 )
 from surveillance_controllers.motion.place_recording import PlaceRecorder
+from surveillance_controllers.motion.pose_doubt import PoseDoubt, PoseTrace
 from surveillance_runtime.conversions import (
     pose_estimate,
     pose_from,
@@ -87,6 +89,9 @@ POSE_PERIOD = 0.2
 STALLED = 90.0
 """A robot that has not moved for so long on its way is not brought there, seconds: some server
 never answers, or a costmap does not clear. Nav2's own recoveries are through before."""
+LOOK_AT_SCANS = 1.0
+"""Time between two scans that are compared with the map, seconds."""
+POSE_CAUSE = ('robot', 'pose')
 MOVED = 0.25
 """It has moved when it is this far from where it was, metres."""
 
@@ -187,6 +192,10 @@ class Nav2Motion:
         knowledge.follow_places(self._set_positions)
         self._tf = FramesHeard(node)
         self._own_poses: Any = None
+        self._doubt, self._trace = PoseDoubt(), PoseTrace()
+        # A scan and its stamp, until the pose of that time is told.
+        self._scan: tuple[Scan, float] | None = None
+        self._looked_at = -math.inf
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(
             node,
@@ -320,6 +329,8 @@ class Nav2Motion:
             pose, stamp = found
             self._take(pose)
             self._publish(pose, stamp)
+            self._trace.add(stamp, pose)
+            self._compare()
         if self._drive is not None:
             progress, stalled, run = self._drive
             if self.hold.active:
@@ -328,7 +339,12 @@ class Nav2Motion:
                 stalled.set()
 
     def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
-        """Read the doors by a scan, if it is known from where it was made."""
+        """Read the doors by a scan, if it is known from where it was made; keep one a second to
+        compare it with the map.
+        """
+        if time.monotonic() - self._looked_at >= LOOK_AT_SCANS:
+            self._looked_at = time.monotonic()
+            self._scan = scan, seconds_of(message.header.stamp)
         found = self._tf.pose(self._frames.base, self._frames.map, FRESH)
         before, self._seen_from = self._seen_from, None
         if found is None:
@@ -337,7 +353,7 @@ class Nav2Motion:
         self._seen_from = pose, now
         if before is not None and 0.0 < now - before[1] < FRESH:
             turned = abs(angle_between(before[0][2], pose[2]))
-            if turned <= STEADY * (now - before[1]):
+            if turned <= STEADY * (now - before[1]) and not self._doubt.in_doubt:
                 self._doors.see(pose, scan, now)
 
     def _publish(self, pose: Pose, stamp: float) -> None:
@@ -372,7 +388,26 @@ class Nav2Motion:
             grid = conversions.grid_from(message)
             with self._lock:
                 self._places.set_map(grid)
+            self._doubt.set_map(grid)
             self._tell_pose()
+
+    def _compare(self) -> None:
+        """Compare a scan with the map, from where the robot was said to be then."""
+        if self._scan is None or not self._trace.is_past(self._scan[1]):
+            return
+        (scan, stamp), self._scan = self._scan, None
+        pose = self._trace.at(stamp)
+        if pose is None:
+            return
+        if self._doubt.look(pose, scan, stamp):
+            x, y, _ = pose
+            self._node.incidents.begin(
+                POSE_CAUSE,
+                f'the pose that Nav2 tells, ({x:.1f}, {y:.1f}), does not fit what the lidar sees',
+                action='set the pose, in RViz by 2D Pose Estimate, or load the right map',
+            )
+        else:
+            self._node.incidents.end(POSE_CAUSE, 'the pose fits what the lidar sees')
 
     def _set_positions(self, positions: Mapping[str, Points]) -> None:
         with self._lock:
@@ -384,18 +419,22 @@ class Nav2Motion:
             self._tell(point_of(self._pose))
 
     def _tell(self, point: Points) -> None:
-        """Tell the place that the robot is in; where it is in none, that stays as it was."""
+        """Tell the place that the robot is in; where it is in none, or its pose is in doubt, that
+        stays as it was.
+        """
         with self._lock:
             place = self._places.place_at(point)
-        if place is not None:
+        if place is not None and not self._doubt.in_doubt:
             self._recorder.tell(place)
 
     def place_reached(self, goal: Points, end: Points) -> str:
         """Return the place that the robot is in, which is at `end`, shape (3,).
 
         Raises:
-            MotionFailedError: It is not in the goal's place.
+            MotionFailedError: It is not in the goal's place, or its pose is in doubt.
         """
+        if self._doubt.in_doubt:
+            raise MotionFailedError('the pose of Nav2 does not fit what the lidar sees', end)
         with self._lock:
             place, wanted = self._places.place_at(end), self._places.place_at(goal)
         return expect_place(place, wanted, end)
