@@ -36,8 +36,12 @@ _MAP_WITHIN = 8.0
 """What the robot sees goes into the map within this time, seconds; slam_toolbox takes 5."""
 _NEAR_WALL = 0.15
 """A point this near to what the map has is no obstacle of its own, metres."""
+_WAITS, _TRIES = 10.0, 3
+"""For who stands in the way the robot waits so long, seconds, before it tries what is left once
+more; so often."""
 _BLIND_SPOT = 'what lies behind cannot be seen from beside it'
 _TOO_NARROW = 'the robot does not fit there'
+_FOR_GOOD = _BLIND_SPOT, _TOO_NARROW
 _ALL_AROUND = 6.0
 """A lidar that sees less than this, rad, turns once before the first drive."""
 
@@ -124,6 +128,8 @@ class Exploration:
         self._spent: list[tuple[Points, str]] = []
         self._looked = False
         self._mended_at = -1
+        self._tries = 0
+        self._waits_until: float | None = None
         self._now = self._arrived_at = self._stood = 0.0
         self._heard_at: float | None = None
 
@@ -279,6 +285,10 @@ class Exploration:
             able = [each for each in self._left if each.viewpoint is not None]
             if not able and self._mend():
                 continue
+            if not able and self._is_barred():
+                if self._waits():
+                    return
+                continue
             if not able:
                 self.goal = None
                 self.phase = Phase.RETURNING
@@ -294,6 +304,24 @@ class Exploration:
                 self.goal = chosen
                 return
             self._give_up(chosen, self.reason)
+
+    def _is_barred(self) -> bool:
+        """Tell whether something is left only because of what stood in the way, maybe people."""
+        reasons = {self._why(each) for each in self._left if each.viewpoint is None}
+        return self._tries < _TRIES and bool(reasons - set(_FOR_GOOD))
+
+    def _waits(self) -> bool:
+        """Stand for a while; tell whether it still does. Then what was barred is tried again."""
+        if self._waits_until is None:
+            self._waits_until = self._now + _WAITS
+            with self._lock:
+                self._task, self.goal = None, None
+        if self._now < self._waits_until:
+            return True
+        self._waits_until = None
+        self._tries += 1
+        self._spent = [each for each in self._spent if each[1] in _FOR_GOOD]
+        return False
 
     def _mend(self) -> bool:
         """Look whether the map contradicts itself, before it is called whole; tell whether it
