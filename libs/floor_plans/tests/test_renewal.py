@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,7 @@ def test_rooms_doors_zones_and_rules_outlive_a_newer_map(tmp_path: Path) -> None
     assert (x, y) == pytest.approx(moved(old_x, old_y), abs=0.1)
     assert yaw == pytest.approx(old_yaw + YAW, abs=0.01)
     assert any(line.startswith('rooms kept: ') for line in report.lines)
-    assert not any(line.startswith(('rooms gone', 'rooms new')) for line in report.lines)
+    assert report.content['changes'] == []
 
 
 def test_a_new_wall_makes_a_new_room_and_all_others_keep_their_names(tmp_path: Path) -> None:
@@ -95,7 +96,48 @@ def test_a_new_wall_makes_a_new_room_and_all_others_keep_their_names(tmp_path: P
     was = read_place(older(tmp_path)).place
     assert set(was.rooms) < set(place.rooms)
     assert set(was.doors) < set(place.doors)
-    assert any(line.startswith('rooms new: R5') for line in report.lines)
+    assert [(each['name'], each['kept']) for each in report.content['changes']] == [('R5', 'new')]
+    assert any(line.startswith('room R5 is new: it was a part of ') for line in report.lines)
+
+
+def test_a_change_of_a_newer_map_is_taken_or_not_piece_by_piece(tmp_path: Path) -> None:
+    source, old = newer(tmp_path, with_wall=True), older(tmp_path)
+    request = ImportRequest(source, tmp_path / 'p.yaml', update=old, keep_old=('R5',))
+    report = import_place(request)
+    assert [(each['name'], each['kept']) for each in report.content['changes']] == [('R5', 'old')]
+    place = read_place(tmp_path / 'p.yaml').place
+    assert {name: set(sides) for name, sides in place.doors.items()} == {
+        name: set(sides) for name, sides in read_place(old).place.doors.items()
+    }
+    with pytest.raises(ValueError, match=r"^--keep-old: no change 'R9': expected 'R5'"):
+        import_place(replace(request, keep_old=('R9',), force=True))
+
+
+def test_a_room_whose_wall_is_gone_comes_back_with_what_was_said_of_it(tmp_path: Path) -> None:
+    """The newer map shows no wall any more between R4 and what is beside it."""
+    plan = read_place(older(tmp_path)).plan
+    grid = plan.grid()
+    cells = grid.cells.copy()
+    gone = next(name for name in plan.place.rooms['R4'] if len(plan.place.doors[name]) == 2)
+    door = plan.doors[gone]
+    for along in np.arange(-2.0, 2.0, 0.02):
+        for across in np.arange(-0.15, 0.15, 0.02):
+            x = door.x + along * math.cos(door.yaw) - across * math.sin(door.yaw)
+            y = door.y + along * math.sin(door.yaw) + across * math.cos(door.yaw)
+            cells[grid.cell_of(x, y)] = 0
+    write_map(tmp_path / 'open.yaml', cells[::-1], grid.resolution, (*grid.origin, 0.0))
+    out = tmp_path / 'p.yaml'
+    request = ImportRequest(tmp_path / 'open.yaml', out, update=older(tmp_path))
+    report = import_place(request)
+    assert 'R4' not in read_place(out).place.rooms
+    changes = {each['name']: each for each in report.content['changes']}
+    assert changes['R4']['can_keep_old']
+    import_place(replace(request, keep_old=('all',), force=True))
+    now = read_place(out)
+    assert set(now.place.doors[gone]) == set(plan.place.doors[gone])
+    assert now.rules.thresholds['R4'] == 90.0
+    x, y, _ = plan.place.positions['R4']
+    assert RoomMap(now.plan).room_at(x, y) == 'R4'
 
 
 def test_another_building_is_refused(tmp_path: Path) -> None:

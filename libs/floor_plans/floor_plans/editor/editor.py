@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import copy
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from floor_plans.description import described_in, map_file_beside
+from floor_plans.editor.changes import Change
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.map_rooms.confidence import DOUBTFUL, door_confidence
+from floor_plans.occupancy_grid import totals
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.patrol_rules import PatrolRules, patrol_rules
 from floor_plans.room_map import ROBOT_RADIUS, FloorPart, RoomMap, check_passable
@@ -65,7 +67,7 @@ class Moment:
             return ()
         labels, names = self.regions.numbers()
         floor = np.where(self.regions.grid.free, np.maximum(labels, 0), 0)
-        counts = np.bincount(floor.ravel(), minlength=max(names, default=0) + 1)
+        counts = totals(floor, max([*names, int(floor.max()), 0]) + 1)
         side = self.regions.grid.resolution
         areas = {name: float(counts[number]) * side**2 for number, name in names.items()}
         doors = {
@@ -100,6 +102,7 @@ class PlaceEditor:
         more_checks: Callable[[Place], Any] = lambda _: None,
     ) -> None:
         self.path = path
+        self._changes: dict[str, Change] = {}
         self._radius = radius
         self._more_checks = more_checks
         self._map: OccupancyMap | None = None
@@ -166,6 +169,45 @@ class PlaceEditor:
         except ValueError as error:
             return str(error)
         return ''
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What has changed since an older place and nobody has decided yet."""
+        return tuple(each for each in self._changes.values() if each.is_open(self.now.plan))
+
+    def decide(self, changes: Sequence[Change]) -> None:
+        """Have each of these decided by a person: `keep_old` or `take_new`."""
+        self._changes = {each.name: each for each in changes}
+
+    def keep_old(self, name: str) -> str:
+        """Have the room or door of a change as the older place had it.
+
+        Raises:
+            ValueError: That cannot be; nothing has changed.
+        """
+        change = self._change(name)
+        if not change.keep:
+            raise ValueError(f'{change.said}; nothing here can bring the older state back')
+        before = self._at, self._saved, list(self._history)
+        try:
+            for operation, fields in change.keep:
+                self.apply(operation, fields)
+        except ValueError:
+            self._at, self._saved, self._history = before
+            raise
+        return f'as before: {change.kind} {name}'
+
+    def take_new(self, name: str) -> str:
+        """Have the room or door of a change as it is now."""
+        change = self._change(name)
+        del self._changes[name]
+        return f'taken: {change.said}'
+
+    def _change(self, name: str) -> Change:
+        known = {each.name: each for each in self.changes}
+        if name not in known:
+            raise ValueError(f'no change {name!r}: expected {nearest(name, known)}')
+        return known[name]
 
     def undo(self) -> str:
         """Take the last change back.

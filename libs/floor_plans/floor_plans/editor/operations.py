@@ -61,25 +61,46 @@ class Draft:
             self.described[key] = value
 
 
-def cut(draft: Draft, x1: float, y1: float, x2: float, y2: float) -> str:
-    """Cut the room that a line runs through in two."""
+def cut(
+    draft: Draft,
+    x1: float,
+    y1: float,
+    x2: float,
+    y2: float,
+    name: str = '',
+    door: str = '',
+    x: float | None = None,
+    y: float | None = None,
+) -> str:
+    """Cut the room that a line runs through in two.
+
+    The new part and the door get the next free names, unless they are given; a point x, y says
+    which part is the new one.
+    """
     if not draft.plan.is_enclosed:
         raise ValueError('a place with neither walls nor a map cannot be cut: add rooms by hand')
     found = cut_of(draft.plan, draft.regions, (x1, y1), (x2, y2), draft.radius)
     grid, room = draft.regions.grid, found.room
-    name = _next_name('R', _names(draft))
-    line = _next_name('D', {*_names(draft), name})
-    parts = {room: found.own, name: found.other}
+    name = name or _next_name('R', _names(draft))
+    line = door or _next_name('D', {*_names(draft), name})
+    for kind, new in (('room', name), ('door', line)):
+        if new in _names(draft):
+            raise ValueError(f"there is a '{new}' already")
+        if problem := problem_in_name(kind, new):
+            raise ValueError(problem)
+    own, other = found.own, found.other
+    if x is not None and y is not None and grid.at(own, x, y):
+        own, other = other, own
+    parts = {room: own, name: other}
     rooms, positions = draft.table('map'), draft.table('room_positions')
     doors: dict[str, list[str]] = {room: [], name: []}
-    for door in draft.plan.place.rooms[room]:
-        known = draft.plan.doors.get(door)
+    for each in draft.plan.place.rooms[room]:
+        known = draft.plan.doors.get(each)
         side = room if known is None else sides_of(known, parts, grid)
-        doors[side].append(door)
-    x, y, _ = draft.plan.place.positions[room]
-    if not grid.at(found.own, x, y):
-        positions[room] = _rounded(*free_point(grid, found.own, draft.radius))
-    positions[name] = _rounded(*free_point(grid, found.other, draft.radius))
+        doors[side].append(each)
+    if not grid.at(own, *draft.plan.place.positions[room][:2]):
+        positions[room] = _rounded(*free_point(grid, own, draft.radius))
+    positions[name] = _rounded(*free_point(grid, other, draft.radius))
     rooms[room], rooms[name] = [*doors[room], line], [*doors[name], line]
     draft.table('doors')[line] = _row(found.door)
     if draft.plan.walls and draft.plan.map is None:
@@ -92,7 +113,7 @@ def cut(draft: Draft, x1: float, y1: float, x2: float, y2: float) -> str:
         yaw = math.atan2(y2 - y1, x2 - x1)
         middle = [round((x1 + x2) / 2, 4), round((y1 + y2) / 2, 4)]
         draft.table('doors')[line] = [*middle, round(yaw, 6), width]
-    _keep_station(draft, {room: found.own, name: found.other})
+    _keep_station(draft, parts)
     return f'{room} is cut: the new part is {name}, joined by {line}'
 
 
@@ -533,7 +554,7 @@ OPERATIONS: Mapping[str, Callable[..., str]] = {
 """Every change by its name."""
 _TYPES: Mapping[str, type] = {
     **dict.fromkeys(('x', 'y', 'x1', 'y1', 'x2', 'y2', 'yaw', 'width', 'z', 'speed'), float),
-    **dict.fromkeys(('name', 'new', 'room', 'first', 'second', 'kind', 'key'), str),
+    **dict.fromkeys(('name', 'new', 'room', 'first', 'second', 'kind', 'key', 'door'), str),
     'on': bool,
     'id': int,
 }

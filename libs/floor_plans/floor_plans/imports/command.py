@@ -54,6 +54,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         'names and all that is said of them, and what has changed is told',
     )
     parser.add_argument(
+        '--keep-old',
+        default='',
+        metavar='NAMES',
+        help='rooms and doors of --update that have changed and are to be as they were: R5,D9; '
+        'all: each of which that can be',
+    )
+    parser.add_argument(
         '--with-outside',
         action='store_true',
         help='make a room of what is outside of the building, up to the edge of the map',
@@ -93,6 +100,12 @@ def _photo(options: argparse.Namespace) -> PlanPhoto | None:
     return PlanPhoto.from_words(options.plan_corners, options.plan_scale)
 
 
+def _names(options: argparse.Namespace) -> tuple[str, ...]:
+    if options.keep_old and options.update is None:
+        raise ValueError('--keep-old: expected --update with it')
+    return tuple(name for each in options.keep_old.split(',') if (name := each.strip()))
+
+
 def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | None = None) -> int:
     """Make a place of a map and say what was found; the exit code is 2 for bad input.
 
@@ -119,6 +132,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
                 aisles=options.aisles,
                 photo=_photo(options),
                 update=options.update,
+                keep_old=_names(options),
                 command=f'{parser.prog} {options.map}',
             )
         )

@@ -18,10 +18,11 @@ from PIL import Image
 from floor_plans import ROBOT_RADIUS, read_place
 from floor_plans.description import described_in
 from floor_plans.drawing import draw_place
+from floor_plans.editor import PlaceEditor, changes_between
 from floor_plans.facts import counted, facts
 from floor_plans.imports.graphs import SUFFIXES, read_graph
 from floor_plans.imports.plan_photo import SIDE, PlanPhoto, read_photo, walls_of_photo
-from floor_plans.imports.renewal import renewed
+from floor_plans.imports.renewal import Alignment, Renewal, renewed
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import LeftOut, Proposal, propose
 from floor_plans.map_rooms.confidence import DOUBTFUL
@@ -60,6 +61,8 @@ class ImportRequest:
             map.
         update: The place of an older map of the building, from which rooms keep their names;
             None: there is none.
+        keep_old: Names of rooms and doors that have changed since then and are to be as they were;
+            `all` stands for all of them.
         command: What a person typed, for the head of the place's file; empty: nothing.
         kept: Files that are not written over, whatever was asked for.
     """
@@ -75,6 +78,7 @@ class ImportRequest:
     aisles: bool = False
     photo: PlanPhoto | None = None
     update: Path | None = None
+    keep_old: tuple[str, ...] = ()
     command: str = ''
     kept: tuple[Path, ...] = ()
 
@@ -145,12 +149,13 @@ def import_place(request: ImportRequest) -> ImportReport:
     sweep = {'sweep': list(large)} if large and request.update is None else {}
     parameters: Mapping[str, Any] = {**proposal.parameters, **sweep}
     halls = [_hall_in_words(name, hall) for name, hall in large.items()]
-    changes: tuple[str, ...] = ()
-    if request.update is not None:
-        parameters, changes = _updated(request, request.update, building, proposal)
-    return _written(
-        request, proposal, reference, parameters, [*notes, *building.notes, *changes, *halls], large
-    )
+    notes += building.notes
+    if request.update is None:
+        return _written(request, proposal, reference, parameters, [*notes, *halls], large)
+    renewal = _renewed(request.update, request, building, proposal)
+    notes += [*renewal.said, *halls]
+    report = _written(request, proposal, reference, renewal.parameters, notes, large)
+    return _decided(request, request.update, renewal.lies, proposal, report)
 
 
 def _map_of_photo(request: ImportRequest, photo: PlanPhoto) -> Path:
@@ -180,18 +185,60 @@ def _hall_in_words(name: str, hall: Hall) -> str:
     return said
 
 
-def _updated(
-    request: ImportRequest, older: Path, building: OccupancyMap, proposal: Proposal
-) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+def _renewed(
+    older: Path, request: ImportRequest, building: OccupancyMap, proposal: Proposal
+) -> Renewal:
     """Return a place's parameters with what an older place says, and what has changed."""
     plan = read_place(older, radius=request.radius).plan
     if not plan.is_enclosed:
         raise ValueError(f'--update {older}: has neither walls nor a map: expected one to compare')
     try:
-        found = renewed(plan, described_in(older)[1], building, proposal)
+        return renewed(plan, described_in(older)[1], building, proposal)
     except ValueError as error:
         raise ValueError(f'--update {older}: {error}') from None
-    return found.parameters, found.changes
+
+
+def _decided(
+    request: ImportRequest,
+    older: Path,
+    lies: Alignment,
+    proposal: Proposal,
+    report: ImportReport,
+) -> ImportReport:
+    """Bring back what is to be as in the older place; tell of each change how it was decided."""
+    plan = read_place(older, radius=request.radius).plan
+    editor = PlaceEditor(request.place, radius=request.radius)
+    changes = changes_between(plan, described_in(older)[1], editor.now.plan, lies)
+    editor.decide(changes)
+    back = [each.name for each in changes if each.keep]
+    known = {each.name for each in changes}
+    every = request.keep_old == ('all',)
+    lines = []
+    for name in back if every else request.keep_old:
+        if name in known - {each.name for each in editor.changes}:
+            continue  # came back with another one
+        try:
+            lines.append(editor.keep_old(name))
+        except ValueError as error:
+            if not every:
+                raise ValueError(f'--keep-old: {error}; {request.place} is as the map') from None
+            lines.append(f'{name} cannot be as before: {error}')
+    if editor.is_changed:
+        _draw(request, editor.text(), Path(report.content['drawn']), proposal)
+    still = {each.name for each in editor.changes}
+    listed = [
+        {
+            **{'kind': each.kind, 'name': each.name, 'is_new': each.is_new, 'said': each.said},
+            **{'can_keep_old': bool(each.keep), 'kept': 'new' if each.name in still else 'old'},
+        }
+        for each in changes
+    ]
+    told = [f'{each["said"]} (kept: {each["kept"]})' for each in listed]
+    if still & set(back):
+        told.append('--keep-old NAME,... brings such a room or door back as it was')
+    return ImportReport(
+        report.found, (*report.lines, *told, *lines), {**report.content, 'changes': listed}
+    )
 
 
 def _is_free(path: Path, request: ImportRequest) -> None:

@@ -10,7 +10,7 @@ that the place's file says is carried over, turned and shifted with the map.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,13 +70,13 @@ class Renewal:
 
     Attributes:
         parameters: All of its file below `ros__parameters`, but for the map's file.
-        names: The name of each room of the proposal.
-        changes: What has changed, a line each.
+        lies: How the newer map lies on the older one.
+        said: How it lies and which rooms are kept, a line each.
     """
 
     parameters: Mapping[str, Any]
-    names: Mapping[str, str]
-    changes: tuple[str, ...]
+    lies: Alignment
+    said: tuple[str, ...]
 
 
 def alignment(old: Grid, new: Grid) -> Alignment:
@@ -204,7 +204,7 @@ def renewed(
     parameters = _named_anew(proposal.parameters, names, doors)
     kept = set(same.values())
     _carry_over(parameters, described, lies, kept)
-    return Renewal(parameters, names, _changes(plan, lies, same, names, doors))
+    return Renewal(parameters, lies, _in_words(plan, lies, same))
 
 
 def _same_rooms(
@@ -347,27 +347,11 @@ def _carry_over(
         parameters['robot_room'] = described['robot_room']
 
 
-def _changes(
-    plan: FloorPlan,
-    lies: Alignment,
-    same: Mapping[str, str],
-    names: Mapping[str, str],
-    doors: Mapping[str, str],
-) -> tuple[str, ...]:
+def _in_words(plan: FloorPlan, lies: Alignment, same: Mapping[str, str]) -> tuple[str, ...]:
     x, y = lies.shift
-    turned = math.degrees(lies.yaw)
-    lines = [
-        f'the newer map lies on the older one by {lies.agreement:.0%}, turned by {turned:.1f} '
-        f'degrees and shifted by ({x:.2f}, {y:.2f}) m'
-    ]
-
-    def listed(what: str, entries: Sequence[str]) -> None:
-        if entries:
-            lines.append(f'{what}: {", ".join(entries)}')
-
-    listed('rooms kept', [room for room in plan.place.rooms if room in same.values()])
-    listed('rooms new', [name for room, name in names.items() if room not in same])
-    listed('rooms gone', [room for room in plan.place.rooms if room not in same.values()])
-    listed('doors new', [name for name in doors.values() if name not in plan.place.doors])
-    listed('doors gone', [name for name in plan.place.doors if name not in doors.values()])
-    return tuple(lines)
+    kept = [room for room in plan.place.rooms if room in same.values()]
+    return (
+        f'the newer map lies on the older one by {lies.agreement:.0%}, turned by '
+        f'{math.degrees(lies.yaw):.1f} degrees and shifted by ({x:.2f}, {y:.2f}) m',
+        f'rooms kept: {", ".join(kept) or "none"}',
+    )
