@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from floor_plans import read_place
+from floor_plans.editor import PlaceEditor
 from floor_plans.imports import ImportRequest, import_place
 from floor_plans.occupancy_map import write_map
 from surveillance_operator.page.server import Page
@@ -121,6 +122,32 @@ def test_what_is_left_out_becomes_a_room_at_one_tap(browser: Viewer, tmp_path: P
 
 
 @in_browser
+def test_what_a_newer_map_changed_is_decided_piece_by_piece(
+    browser: Viewer, file: Path, tmp_path: Path
+) -> None:
+    newer = tmp_path / 'newer.yaml'
+    shutil.copy(file, newer)
+    editor = PlaceEditor(newer)
+    for x, y1, y2 in ((13.7, 10.0, 14.5), (13.7, 6.5, 10.0)):
+        editor.apply('cut', {'x1': x, 'y1': y1, 'x2': x, 'y2': y2})
+    editor.save()
+    page = editor_page(newer, '127.0.0.1', 0, 0.22, older=file)
+    page.start()
+    try:
+        hand = Hand(browser, page)
+        browser.until(lambda: 'R5 is new' in browser.text('#changes'), 20.0)
+        assert browser.axe() == []
+        browser.click('#changes [aria-label="Keep as it was: room R5"]')
+        hand.said('as before: room R5')
+        assert 'R5' not in hand.place('rooms')
+        browser.click('#changes [aria-label="Take: room R6"]')
+        hand.said('taken: room R6 is new')
+        assert hand.place('changes') == []
+    finally:
+        page.stop()
+
+
+@in_browser
 def test_a_place_is_changed_without_a_mouse(browser: Viewer, page: Page, file: Path) -> None:
     from selenium.webdriver.common.keys import Keys
 
@@ -197,3 +224,6 @@ def test_what_cannot_be_edited_is_said_in_one_line(
     with pytest.raises(SystemExit):
         main([str(SEVEN), '--web-address', '8080'])
     assert 'expected HOST:PORT' in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(['--older', str(SEVEN)])
+    assert '--older: expected the newer place with it' in capsys.readouterr().err

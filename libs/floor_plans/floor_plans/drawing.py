@@ -20,6 +20,7 @@ from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from floor_plans import shapes
 from floor_plans.floor_plan import Door, FloorPlan, Marker
+from floor_plans.occupancy_grid import looked_up
 from floor_plans.room_map import RoomMap
 from floor_plans.shapes import WALL_THICKNESS, Point
 
@@ -82,10 +83,11 @@ def draw_place(
     right = _PANEL + 50 if run and run.waits else 40
     # Wide enough for the words above and the signs below, however small the place is.
     right += max(0, math.ceil(560 - (east - west) * scale))
+    regions = RoomMap(plan)  # before there is a canvas: both take memory
     canvas = Canvas(plan.bounds, scale, (40, 96, right, 86), _PAPER)
     canvas.text((40, 22), title, 26, _INK)
     canvas.text((40, 58), facts if run is None else run.summary, 15, _SOFT)
-    picture = _Picture(canvas, plan)
+    picture = _Picture(canvas, plan, regions)
     picture.floors(run)
     picture.set_aside(aside or {})
     if run is None:
@@ -109,9 +111,9 @@ def draw_place(
 
 
 class _Picture:
-    def __init__(self, canvas: Canvas, plan: FloorPlan) -> None:
+    def __init__(self, canvas: Canvas, plan: FloorPlan, regions: RoomMap) -> None:
         self._canvas = canvas
-        self._regions = RoomMap(plan)
+        self._regions = regions
         self._plan = plan
         self._place = plan.place
         self._aside: dict[str, str] = {}
@@ -131,10 +133,14 @@ class _Picture:
         if self._plan.map is not None:
             # As cells: around what stands in a room, an outline has holes.
             labels, names = self._regions.numbers()
-            order = np.zeros(max([*names, int(labels.max()), 0]) + 1, np.uint16)
-            order[list(names)] = np.arange(1, len(names) + 1)
-            which = np.where(grid.free, order[np.maximum(labels, 0)], np.uint16(0))
-            colours = [colour_of(name) for name in names.values()]
+            colours = list(dict.fromkeys(colour_of(name) for name in names.values()))
+            order = np.zeros(
+                max([*names, int(labels.max()), 0]) + 1, np.min_scalar_type(len(colours))
+            )
+            for number, name in names.items():
+                order[number] = 1 + colours.index(colour_of(name))
+            which = looked_up(order, labels)
+            which[~grid.free] = 0
             self._canvas.raster(which, grid.origin, grid.resolution, colours)
             return
         for name, mask in self._regions.masks().items():
@@ -158,7 +164,7 @@ class _Picture:
             return
         self._aside = dict(zip(aside, _ASIDE, strict=False))
         grid = self._plan.map.grid
-        which = np.zeros(grid.cells.shape, np.uint16)
+        which = np.zeros(grid.cells.shape, np.uint8)
         for number, mask in enumerate(aside.values(), start=1):
             which[mask] = number
         self._canvas.raster(which, grid.origin, grid.resolution, list(self._aside.values()))
@@ -518,13 +524,15 @@ class Canvas:
         row = np.floor((np.arange(high) + 0.5 - top) / side).astype(np.intp)
         across = np.flatnonzero((column >= 0) & (column < north.shape[1]))
         down = np.flatnonzero((row >= 0) & (row < north.shape[0]))
-        if not across.size or not down.size:
+        if not across.size:
             return
-        shown = north[row[down][:, None], column[across]]
         palette = np.array([(0, 0, 0), *map(ImageColor.getrgb, colours)], np.uint8)
-        corner = (int(across[0]), int(down[0]))
-        mask = Image.fromarray((shown > 0).astype(np.uint8) * np.uint8(255))
-        self._image.paste(Image.fromarray(palette[shown]), corner, mask)
+        for first in range(0, len(down), 256):
+            some = down[first : first + 256]
+            shown = north[row[some][:, None], column[across]]
+            mask = Image.fromarray((shown > 0).astype(np.uint8) * np.uint8(255))
+            corner = (int(across[0]), int(some[0]))
+            self._image.paste(Image.fromarray(palette[shown]), corner, mask)
 
     def arc(
         self,

@@ -172,7 +172,7 @@ def distance_to(mask: NDArray[np.bool_], resolution: float) -> NDArray[np.float3
     import cv2
 
     away = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.asarray(away * np.float32(resolution), dtype=np.float32)
+    return np.asarray(np.multiply(away, np.float32(resolution), out=away), dtype=np.float32)
 
 
 def totals(
@@ -187,6 +187,19 @@ def totals(
         rows = np.s_[top : top + 256]
         some = None if weights is None else weights[rows].ravel()
         found += np.bincount(labels[rows].ravel(), some, minlength=count)
+    return found
+
+
+def looked_up(
+    table: NDArray[Any], labels: NDArray[Any], out: NDArray[Any] | None = None
+) -> NDArray[Any]:
+    """Return what a table has for the number of each cell, `table[labels]`; `out` may be `labels`.
+
+    Some rows at a time: numpy makes 8 bytes of each index.
+    """
+    found = np.empty(labels.shape, table.dtype) if out is None else out
+    for top in range(0, len(labels), 256):
+        found[top : top + 256] = table[labels[top : top + 256]]
     return found
 
 
@@ -280,13 +293,54 @@ def regions(free: NDArray[np.bool_]) -> NDArray[np.int32]:
     import cv2
 
     labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
-    nearest = cv2.distanceTransformWithLabels(
-        (~free).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )[1]
-    seeds = np.zeros(int(nearest.max()) + 1, np.int32)
-    seeds[nearest[free]] = labels[free]
-    found: NDArray[np.int32] = seeds[nearest]
-    return found
+    return spread(np.asarray(labels, np.int32))
+
+
+_BAND, _BESIDE_BAND = 1024, 64
+_COARSE = 8
+
+
+def spread(labels: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Give each cell the label of the nearest cell that has one, not 0; in place, and returned.
+
+    It is looked for in bands of rows, as a distance field of all of a large map takes more memory
+    than all else. What is farther from every label than a band reaches beyond itself gets that of
+    about the nearest, on every eighth cell.
+    """
+    rows, left = len(labels), 0
+    if rows <= _BAND + _BESIDE_BAND:
+        labels[:] = _spread(labels)[0]
+        return labels
+    above = labels[:0].copy()
+    for top in range(0, rows, _BAND):
+        own = labels[top : top + _BAND]
+        part = np.concatenate([above, labels[top : top + _BAND + _BESIDE_BAND]])
+        begins = len(above)
+        above = own[-_BESIDE_BAND:].copy()  # as it was, for the next band
+        if part.any():
+            filled, away = _spread(part)
+            inside = np.s_[begins : begins + len(own)]
+            np.copyto(own, filled[inside], where=away[inside] <= _BESIDE_BAND)
+        left += own.size - int(np.count_nonzero(own))
+    if left:
+        coarse = _spread(np.ascontiguousarray(labels[::_COARSE, ::_COARSE]))[0]
+        for row in range(rows):
+            whole = coarse[row // _COARSE].repeat(_COARSE)[: labels.shape[1]]
+            np.copyto(labels[row], whole, where=labels[row] == 0)
+    return labels
+
+
+def _spread(labels: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the same in one piece, and how far each cell is from the nearest with a label."""
+    import cv2
+
+    seeds = labels != 0
+    away, nearest = cv2.distanceTransformWithLabels(
+        (~seeds).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    of_seed = np.zeros(int(nearest.max()) + 1, np.int32)
+    of_seed[nearest[seeds]] = labels[seeds]
+    return of_seed[nearest], np.asarray(away, np.float32)
 
 
 LARGE_PART = 1.0
@@ -312,13 +366,14 @@ def divided(grid: Grid, points: Sequence[Point]) -> NDArray[np.int32]:
     import cv2
 
     free = grid.free
+    in_walls = any(grid.at(free, x, y) is False for x, y in points)
     count, parts, stats, _ = cv2.connectedComponentsWithStats(
         free.astype(np.uint8), connectivity=4, ltype=cv2.CV_32S
     )
     if count < 2:
         return np.zeros(free.shape, np.int32)
-    in_walls = any(grid.at(free, x, y) is False for x, y in points)
     everywhere = regions(free) if in_walls else parts
+    del free
     inside: dict[int, list[int]] = {}
     for number, (x, y) in enumerate(points, start=1):
         if (part := grid.at(everywhere, x, y)) is not None:
@@ -330,22 +385,17 @@ def divided(grid: Grid, points: Sequence[Point]) -> NDArray[np.int32]:
     number_of_part[0] = 0
     for part, numbers in inside.items():
         number_of_part[part] = numbers[0]
-    labels: NDArray[np.int32] = number_of_part[parts]
+    several: list[tuple[tuple[NDArray[np.intp], ...], NDArray[np.intp]]] = []
     for part, numbers in inside.items():
         if len(numbers) > 1:
-            cells = np.argwhere(parts == part)
-            away = [np.hypot(*(grid.centres_of(cells) - points[n - 1]).T) for n in numbers]
-            labels[cells[:, 0], cells[:, 1]] = np.array(numbers)[np.argmin(away, axis=0)]
-    known = labels != 0
-    if not known.any():
-        return labels
-    nearest = cv2.distanceTransformWithLabels(
-        (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )[1]
-    seeds = np.zeros(int(nearest.max()) + 1, np.int32)
-    seeds[nearest[known]] = labels[known]
-    # In place, as such a field of a large map takes 64 MB; clipping needs no copy.
-    return np.asarray(np.take(seeds, nearest, out=nearest, mode='clip'))
+            where = np.nonzero(parts == part)
+            centres = grid.centres_of(np.stack(where, axis=1))
+            away = [np.hypot(*(centres - points[n - 1]).T) for n in numbers]
+            several.append((where, np.array(numbers)[np.argmin(away, axis=0)]))
+    labels = looked_up(number_of_part, parts, out=parts)
+    for where, nearest in several:
+        labels[where] = nearest
+    return spread(labels)
 
 
 def outlines(grid: Grid, tolerance: float) -> list[Points]:

@@ -404,12 +404,17 @@ def _pixels(picture: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None]
     alpha = _in_8_bits(values[..., -1]) if values.ndim == 3 and values.shape[2] in (2, 4) else None
     if values.ndim == 2 or values.shape[2] < 3:
         return _in_8_bits(values if values.ndim == 2 else values[..., 0]), alpha
-    weighted = np.zeros(values.shape[:2], np.uint32)
-    for channel, weight in enumerate(_LUMINANCE):
-        weighted += values[..., channel].astype(np.uint32) * np.uint32(weight)
-    # GraphicsMagick computes in 16 bits, where a sample of 8 bits stands twice.
-    in_16_bits = weighted if values.dtype == np.uint16 else weighted * np.uint32(257)
-    return _in_8_bits((in_16_bits >> 10).astype(np.uint16)), alpha
+    grey = np.empty(values.shape[:2], np.uint8)
+    for top in range(0, len(values), 256):  # 8 bytes of each pixel, some rows at a time
+        some = values[top : top + 256]
+        weighted = np.zeros(some.shape[:2], np.uint32)
+        for channel, weight in enumerate(_LUMINANCE):
+            weighted += some[..., channel].astype(np.uint32) * np.uint32(weight)
+        # GraphicsMagick computes in 16 bits, where a sample of 8 bits stands twice.
+        if values.dtype == np.uint8:
+            weighted *= np.uint32(257)
+        grey[top : top + 256] = _in_8_bits((weighted >> 10).astype(np.uint16))
+    return grey, alpha
 
 
 def _in_8_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:

@@ -174,7 +174,9 @@ class RoomMap:
                     ('room_positions', room),
                     f'({x:g}, {y:g}) lies {found}: expected free space',
                 )
-        return np.maximum(divided(grid, points), 0)
+        labels = divided(grid, points)
+        labels[labels < 0] = 0
+        return labels
 
     def _check_doors(self) -> None:
         # Beside the door of a map there may stand something, and its cells may be large.

@@ -10,6 +10,7 @@ from typing import Any
 
 from floor_plans import ROBOT_RADIUS
 from floor_plans.editor import PlaceEditor
+from floor_plans.imports import changes_since
 from surveillance_ontology.patrol_vocabulary import checked_names
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
@@ -32,6 +33,13 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
         help="the place's file; without one, a map is dropped on the page, and a place made of it",
     )
     parser.add_argument(
+        '--older',
+        type=Path,
+        metavar='PLACE',
+        help='the place of an older map of the building: what has changed since is listed, each '
+        'to be taken or brought back',
+    )
+    parser.add_argument(
         '--web-address',
         default='127.0.0.1:0',
         metavar='HOST:PORT',
@@ -47,6 +55,8 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(argv)
     if not 0.01 <= options.robot_radius <= 5.0:
         parser.error(f'--robot-radius {options.robot_radius:g}: expected 0.01 to 5')
+    if options.older and not options.place:
+        parser.error('--older: expected the newer place with it')
     host, _, port = options.web_address.rpartition(':')
     if not host or not port.isdecimal() or int(port) > 65535:
         parser.error(f'--web-address {options.web_address}: expected HOST:PORT')
@@ -54,7 +64,14 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def editor_page(place: Path | None, host: str, port: int, radius: float, token: str = '') -> Page:
+def editor_page(
+    place: Path | None,
+    host: str,
+    port: int,
+    radius: float,
+    token: str = '',
+    older: Path | None = None,
+) -> Page:
     """Return the page on which a place is edited, not started yet.
 
     Args:
@@ -62,21 +79,29 @@ def editor_page(place: Path | None, host: str, port: int, radius: float, token: 
         host, port: Where to serve it; port 0 takes any.
         radius: Of the robot, metres.
         token: What gives access; one is made unless given.
+        older: The place of an older map of the building; None: none is compared with.
 
     Raises:
-        FileError: The file cannot be read or is no sound place.
+        FileError: A file cannot be read or is no sound place.
+        ValueError: The older place has too little in common with it.
         OSError: The address cannot be used.
     """
     folder = Path.cwd() if place is None else place.parent
 
-    def opened(path: Path) -> PlaceEditor:
-        return PlaceEditor(path, radius=radius, more_checks=checked_names)
+    def opened(path: Path, older: Path | None) -> PlaceEditor:
+        editor = PlaceEditor(path, radius=radius, more_checks=checked_names)
+        if older is not None:
+            editor.decide(changes_since(older, editor.now.plan, radius))
+        return editor
 
-    def import_map(files: Mapping[str, Any], *said_of_them: Any) -> tuple[PlaceEditor, str]:
-        path, said = import_dropped(files, folder, radius, *said_of_them)
-        return opened(path), said
+    def import_map(
+        files: Mapping[str, Any], older: Path | None, *said_of_them: str
+    ) -> tuple[PlaceEditor, str]:
+        resolution, level, corners, scale = said_of_them
+        path, said = import_dropped(files, folder, radius, resolution, level, corners, scale, older)
+        return opened(path, older), said
 
-    session = EditSession(None if place is None else opened(place), import_map=import_map)
+    session = EditSession(None if place is None else opened(place, older), import_map=import_map)
     return Page(
         Broadcaster(),
         questions=session.questions,
@@ -94,7 +119,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Serve the page until Ctrl-C; the exit code is 2 for bad input."""
     options = _parse(argv)
     try:
-        page = editor_page(options.place, options.host, options.port, options.robot_radius)
+        page = editor_page(
+            options.place,
+            options.host,
+            options.port,
+            options.robot_radius,
+            older=options.older,
+        )
     except (ValueError, OSError) as error:
         print(f'edit: {error}', file=sys.stderr)
         return EXIT_BAD_INPUT

@@ -16,6 +16,7 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from floor_plans.editor import PlaceEditor
+from floor_plans.map_rooms.confidence import DOUBTFUL
 from floor_plans.parameters import CLASSES
 from surveillance_operator.page.server import Action
 
@@ -65,6 +66,8 @@ class EditSession:
             'redo_edit': lambda: self._done(lambda: self._editor.redo()),
             'reload_place': lambda: self._done(lambda: self._editor.reload()),
             'save_place': lambda: self._done(self._save),
+            'keep_old': lambda name: self._done(lambda: self._editor.keep_old(str(name))),
+            'take_new': lambda name: self._done(lambda: self._editor.take_new(str(name))),
         }
         if self._import_map is not None:
             actions['import_map'] = self._import
@@ -127,7 +130,7 @@ class EditSession:
                 raise ValueError('the open place is not saved: save it, or undo its changes')
             older = self._open.path if keep and self._open is not None else None
             said_of_them = str(resolution), str(level), str(corners), str(scale)
-            self._open, said = make(files, *said_of_them, older)
+            self._open, said = make(files, older, *said_of_them)
             return said
 
         return self._done(change)
@@ -176,6 +179,7 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
                 'hours': hours.get(room, ''),
                 'keep_out': room in rules.calendar.keep_out,
                 'sweep': room in rules.swept,
+                'confidence': now.confidence.get(room),
             }
             for room, doors in place.rooms.items()
         },
@@ -184,6 +188,7 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
                 'at': [door.x, door.y, door.yaw, door.width],
                 'line': list(door.segment),
                 'joins': list(place.doors[name]),
+                'confidence': now.confidence.get(name),
             }
             for name, door in plan.doors.items()
         },
@@ -208,6 +213,11 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
             }
             for number, part in enumerate(now.left_out, start=1)
         },
+        'changes': [
+            {'kind': each.kind, 'name': each.name, 'said': each.said, 'back': bool(each.keep)}
+            for each in editor.changes
+        ],
+        'sure': DOUBTFUL,
         'doubtful': [f'{kind} {name}' for kind, name in now.doubtful],
         'start': place.start,
         'quiet_hours': described.get('quiet_hours', ''),

@@ -68,14 +68,14 @@ def changes_between(
     for room in now.rooms:
         if room not in was.rooms:
             before = _mostly_in(new, room, lies.to_old, old)
-            joined = before in now.rooms and set(now.rooms[before]) & set(now.rooms[room])
+            doors = set(now.rooms.get(before or '', ())) & set(now.rooms[room])
             steps: tuple[Step, ...] = (('join', {'first': before, 'second': room}),)
             said = f'room {room} is new' + (f': it was a part of {before}' if before else '')
-            found.append(Change('room', room, True, said, steps if joined else ()))
+            found.append(Change('room', room, True, said, steps if doors else ()))
     for room in was.rooms:
         if room not in now.rooms:
             there = _mostly_in(old, room, lies.to_new, new)
-            steps = _cut_off(older, described, lies, room, there) if there in was.rooms else ()
+            steps = _cut_off(older, described, lies, room, there) if there else ()
             said = f'room {room} is gone: ' + (f'it is a part of {there}' if there else 'no floor')
             found.append(Change('room', room, False, said, steps))
     both = was.rooms.keys() & now.rooms.keys()

@@ -17,7 +17,7 @@ from floor_plans.description import described_in, map_file_beside
 from floor_plans.editor.changes import Change
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 from floor_plans.floor_plan import FloorPlan
-from floor_plans.map_rooms.confidence import DOUBTFUL, door_confidence
+from floor_plans.map_rooms.confidence import DOUBTFUL, confidence
 from floor_plans.occupancy_grid import totals
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.patrol_rules import PatrolRules, patrol_rules
@@ -57,14 +57,10 @@ class Moment:
         return self.regions.left_out()
 
     @cached_property
-    def doubtful(self) -> tuple[tuple[str, str], ...]:
-        """What of a map's rooms and doors is to be looked at first: kind and name, the least sure
-        first.
-
-        A room that its doors make doubtful is left out: they are looked at.
-        """
+    def confidence(self) -> Mapping[str, float]:
+        """How sure each room and door of a map is, from 0.5 to 1; nothing of a place without."""
         if self.plan.map is None:
-            return ()
+            return {}
         labels, names = self.regions.numbers()
         floor = np.where(self.regions.grid.free, np.maximum(labels, 0), 0)
         counts = totals(floor, max([*names, int(floor.max()), 0]) + 1)
@@ -75,9 +71,16 @@ class Moment:
             for name, door in self.plan.doors.items()
             if len(self.plan.place.doors[name]) == 2
         }
-        sure = door_confidence(areas, doors)
-        found = sorted((each, name) for name, each in sure.items() if each < DOUBTFUL)
-        return tuple(('door', name) for _, name in found)
+        return confidence(areas, doors)
+
+    @cached_property
+    def doubtful(self) -> tuple[tuple[str, str], ...]:
+        """The doors of a map to be looked at first, the least sure first; what makes a room
+        doubtful is one of them.
+        """
+        sure = self.confidence
+        found = sorted((sure[name], name) for name in self.plan.doors if name in sure)
+        return tuple(('door', name) for each, name in found if each < DOUBTFUL)
 
 
 class PlaceEditor:

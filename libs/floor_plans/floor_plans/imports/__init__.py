@@ -12,3 +12,4 @@ from floor_plans.imports.place_import import ImportRequest as ImportRequest
 from floor_plans.imports.place_import import import_place as import_place
 from floor_plans.imports.place_import import is_levels as is_levels
 from floor_plans.imports.plan_photo import PlanPhoto as PlanPhoto
+from floor_plans.imports.renewal import changes_since as changes_since

@@ -18,17 +18,17 @@ from PIL import Image
 from floor_plans import ROBOT_RADIUS, read_place
 from floor_plans.description import described_in
 from floor_plans.drawing import draw_place
-from floor_plans.editor import PlaceEditor, changes_between
+from floor_plans.editor import PlaceEditor
 from floor_plans.facts import counted, facts
 from floor_plans.imports.graphs import SUFFIXES, read_graph
 from floor_plans.imports.plan_photo import SIDE, PlanPhoto, read_photo, walls_of_photo
-from floor_plans.imports.renewal import Alignment, Renewal, renewed
+from floor_plans.imports.renewal import Alignment, Renewal, changes_since, renewed
 from floor_plans.imports.rmf_building import RmfLevel, is_rmf_building, read_rmf_building
 from floor_plans.map_rooms import LeftOut, Proposal, propose
 from floor_plans.map_rooms.confidence import DOUBTFUL
 from floor_plans.map_rooms.halls import Hall
 from floor_plans.map_rooms.proposal import OUTSIDE
-from floor_plans.occupancy_grid import distance_to
+from floor_plans.occupancy_grid import distance_to, looked_up
 from floor_plans.occupancy_map import (
     OccupancyMap,
     is_picture,
@@ -206,9 +206,8 @@ def _decided(
     report: ImportReport,
 ) -> ImportReport:
     """Bring back what is to be as in the older place; tell of each change how it was decided."""
-    plan = read_place(older, radius=request.radius).plan
     editor = PlaceEditor(request.place, radius=request.radius)
-    changes = changes_between(plan, described_in(older)[1], editor.now.plan, lies)
+    changes = changes_since(older, editor.now.plan, request.radius, lies)
     editor.decide(changes)
     back = [each.name for each in changes if each.keep]
     known = {each.name for each in changes}
@@ -423,10 +422,16 @@ def _aside(proposal: Proposal, building: OccupancyMap) -> dict[str, NDArray[np.b
         turned = np.zeros(grid.cells.size, labels.dtype)
         turned[inside] = labels[where[inside, 0], where[inside, 1]]
         labels = turned.reshape(grid.cells.shape)
-    outside = np.isin(labels, proposal.outside) & grid.free
-    left = {each.number for each in proposal.left_out} - {0, *proposal.outside}
-    masks = {'outside': outside, 'left out': np.isin(labels, list(left)) & grid.free}
-    return {word: mask for word, mask in masks.items() if mask.any()}
+    outside = set(proposal.outside)
+    left = {each.number for each in proposal.left_out} - {0, *outside}
+    masks = {}
+    for word, numbers in (('outside', outside), ('left out', left)):
+        table = np.zeros(proposal.segmentation.rooms + 1, np.bool_)
+        table[list(numbers)] = True
+        mask = looked_up(table, labels) & grid.free
+        if mask.any():
+            masks[word] = mask
+    return masks
 
 
 def _import_graph(request: ImportRequest, document: Any) -> ImportReport:

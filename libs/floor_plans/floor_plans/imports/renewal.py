@@ -12,11 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from floor_plans.description import described_in, read_place
+from floor_plans.editor import Change, changes_between
 from floor_plans.floor_plan import Door, FloorPlan
 from floor_plans.map_rooms import Proposal
 from floor_plans.occupancy_grid import Grid, distance_to
@@ -102,6 +105,26 @@ def alignment(old: Grid, new: Grid) -> Alignment:
             f'building, turned by at most {MOST_TURNED:g} degrees'
         )
     return Alignment(yaw, shift, agreement)
+
+
+def changes_since(
+    older: Path, newer: FloorPlan, radius: float, lies: Alignment | None = None
+) -> tuple[Change, ...]:
+    """Return what has changed since an older place of a building.
+
+    Args:
+        older: Its file.
+        newer: The place as it is.
+        radius: Of the robot, metres.
+        lies: How the newer one lies on the older one; None: that is looked for.
+
+    Raises:
+        FileError: The file cannot be read, or is no sound place.
+        ValueError: The places have too little in common.
+    """
+    plan = read_place(older, radius=radius).plan
+    lies = lies or alignment(plan.grid(), newer.grid())
+    return changes_between(plan, described_in(older)[1], newer, lies)
 
 
 def _turn(yaw: float) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.map_rooms.segmentation import CELL, Segmentation
-from floor_plans.occupancy_grid import Grid, boxes, totals
+from floor_plans.occupancy_grid import Grid, boxes, spread, totals
 from floor_plans.visibility import in_view
 
 Labels = NDArray[np.int32]
@@ -151,12 +151,7 @@ def aisles_of(room: Mask, free: Mask) -> tuple[Labels, int]:
     ).astype(np.int32)
     inner = room[box]
     seeds = np.where(inner & (floor > 0), back, 0)
-    _, nearest = cv2.distanceTransformWithLabels(
-        (seeds == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_seed = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_seed[nearest[seeds > 0]] = seeds[seeds > 0]
-    filled = np.where(inner, of_seed[nearest], 0)
+    filled = np.where(inner, spread(seeds), 0)
     used = np.unique(filled[filled > 0])
     numbers = np.zeros(int(filled.max()) + 1, np.int32)
     numbers[used] = np.arange(1, len(used) + 1)

@@ -68,13 +68,13 @@ def _borders(
     resolution: float,
 ) -> dict[tuple[int, int], _Border]:
     rows, columns = np.nonzero((cuts > 0) & (clearance > 0))
-    padded = np.pad(parts, 1)
-    around = np.sort(
-        np.stack(
-            [padded[rows + up, columns + right] for up, right in ((0, 1), (2, 1), (1, 0), (1, 2))]
-        ),
-        axis=0,
-    )
+    # Off the map, a cell is its own neighbour: it lies on a cut.
+    last = np.array(parts.shape)[:, None] - 1
+    beside = [
+        np.clip((rows + up, columns + right), 0, last)
+        for up, right in ((-1, 0), (1, 0), (0, -1), (0, 1))
+    ]
+    around = np.sort(np.stack([parts[row, column] for row, column in beside]), axis=0)
     found: dict[tuple[int, int], _Border] = {}
     mixed = np.flatnonzero(((around > 0) & (around != around[3])).any(axis=0))
     lengths, clear = cuts[rows, columns] * resolution, clearance[rows, columns]

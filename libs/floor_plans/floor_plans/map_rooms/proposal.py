@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.floor_plan import Door, FloorPlan
-from floor_plans.map_rooms.confidence import door_confidence
+from floor_plans.map_rooms.confidence import confidence
 from floor_plans.map_rooms.halls import Hall, halls, with_aisles
 from floor_plans.map_rooms.segmentation import (
     CELL,
@@ -27,9 +27,16 @@ from floor_plans.map_rooms.segmentation import (
     Line,
     Segmentation,
     segment,
-    spread,
 )
-from floor_plans.occupancy_grid import Grid, boxes, distance_to, totals, walled_off
+from floor_plans.occupancy_grid import (
+    Grid,
+    boxes,
+    distance_to,
+    looked_up,
+    spread,
+    totals,
+    walled_off,
+)
 from floor_plans.occupancy_map import OccupancyMap
 from floor_plans.room_map import RoomMap, check_passable
 from floor_plans.rooms import PlaceError
@@ -109,22 +116,15 @@ class Proposal:
         return {name: float(counts[n]) * grid.resolution**2 for n, name in self.names.items()}
 
     def confidence(self) -> dict[str, float]:
-        """Return how sure each room and door is, from 0.5 to 1.
-
-        Of doors `door_confidence` says it; a room is as sure as the least sure of its doors for
-        which it is the smaller.
-        """
-        areas, found = self.areas(), dict.fromkeys(self.names.values(), 1.0)
+        """Return how sure each room and door is, from 0.5 to 1 (`map_rooms.confidence`)."""
         sides: dict[str, list[str]] = {}
         for room, doors in self.parameters['map'].items():
             for door in doors:
                 sides.setdefault(door, []).append(room)
         placed = self.parameters.get('doors', {})
-        sure = door_confidence(areas, {door: (sides[door], row[3]) for door, row in placed.items()})
-        for door, each in sure.items():
-            smaller = min(sides[door], key=areas.__getitem__)
-            found[smaller] = min(found[smaller], each)
-        return {**found, **sure}
+        return confidence(
+            self.areas(), {door: (sides[door], row[3]) for door, row in placed.items()}
+        )
 
     def halls(self, building: OccupancyMap) -> dict[str, Hall]:
         """Return the rooms that are too large to be seen from their points, by name."""
@@ -256,8 +256,9 @@ def _laid_out(floor: _Floor, found: Segmentation, borders: NDArray[np.intp]) -> 
         *(floor.radius, floor.scale),
     )
     outside = frozenset[int]() if floor.with_outside else outside_of(found)
-    inner = np.where(np.isin(labels, list(outside)), 0, labels) if outside else labels
-    reach = _reachable(inner, clearance, radius)
+    within = np.ones(found.rooms + 1, np.bool_)
+    within[[0, *outside]] = False
+    reach = _reachable(looked_up(within, labels), clearance, radius)
     needed = radius + 1.5 * found.working.resolution
     openings = _openings(labels, borders, clearance, needed + _SPARE)
     ways = [
@@ -553,7 +554,7 @@ def _gaps(
     crowded = [part for part, count_ in inside.items() if part and count_ > 1]
     if not crowded:
         return []
-    rooms = np.where(np.isin(parts, crowded), spread(found.labels), 0)
+    rooms = np.where(np.isin(parts, crowded), spread(found.labels.copy()), 0)
     border = np.zeros(rooms.shape, np.bool_)
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         one, other = rooms[here], rooms[there]
@@ -593,9 +594,9 @@ def _as_line(points: NDArray[np.float64]) -> Line:
     return (x1, y1), (x2, y2)
 
 
-def _reachable(labels: Labels, clearance: NDArray[np.float32], radius: float) -> Mask:
+def _reachable(floor: Mask, clearance: NDArray[np.float32], radius: float) -> Mask:
     """Return the cells of the largest part of the floor that the robot can be in."""
-    fits = (clearance > radius) & (labels > 0)
+    fits = floor & (clearance > radius)
     count, pieces, stats, _ = cv2.connectedComponentsWithStats(
         fits.astype(np.uint8), connectivity=8
     )
@@ -610,14 +611,19 @@ def _borders(labels: Labels, free: Mask) -> NDArray[np.intp]:
 
     Joining rooms takes some of them away and adds none, so that they are looked for once.
     """
-    index = np.arange(labels.size, dtype=np.int32).reshape(labels.shape)
     found = []
-    for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+    columns = labels.shape[1]
+    for (up, right), here, there in (
+        ((0, 1), np.s_[:, :-1], np.s_[:, 1:]),
+        ((1, 0), np.s_[:-1], np.s_[1:]),
+    ):
         meet = labels[here] != labels[there]
         meet &= free[here] & free[there]
-        found.append(np.stack([index[here][meet], index[there][meet]]))
+        rows_columns = np.nonzero(meet)
+        first = rows_columns[0] * columns + rows_columns[1]
+        found.append(np.stack([first, first + up * columns + right]))
     pairs = np.concatenate(found, axis=1)
-    return pairs[:, (labels.ravel()[pairs] > 0).all(axis=0)].astype(np.intp)
+    return pairs[:, (labels.ravel()[pairs] > 0).all(axis=0)]
 
 
 def _openings(

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.map_rooms import joining, openings
-from floor_plans.occupancy_grid import Grid, boxes, distance_to, totals
+from floor_plans.occupancy_grid import Grid, boxes, distance_to, looked_up, spread, totals
 
 Labels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
@@ -84,11 +84,11 @@ class Segmentation:
                 into[goes] = keeps
         roots = sorted({_root(into, each) for each in into})
         numbers = np.array([roots.index(_root(into, each)) for each in into], np.int32)
-        working_labels = numbers[self.working_labels]
+        working_labels = looked_up(numbers, self.working_labels)
         same = self.labels is self.working_labels
         return replace(
             self,
-            labels=working_labels if same else numbers[self.labels],
+            labels=working_labels if same else looked_up(numbers, self.labels),
             rooms=len(roots) - 1,
             corridors=frozenset(int(numbers[each]) for each in long if into[each] == each),
             working_labels=working_labels,
@@ -124,11 +124,15 @@ def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
         cv2.connectedComponents((cleared & (cuts == 0)).astype(np.uint8), connectivity=4)[1],
         dtype=np.int32,
     )
-    labels = joining.joined(parts, cuts, clearance, CELL)[parts]
-    labels = np.where(cleared, spread(labels), 0)
+    into = joining.joined(parts, cuts, clearance, CELL)
+    # Whatever has been used goes: each such field of a large map takes 64 MB.
+    del cuts, kept, found
+    labels = spread(looked_up(into, parts, out=parts))
+    del parts
+    labels[~cleared] = 0
     labels = _with_floor_below_furniture(labels, cleared)
     if known.any():
-        labels = np.where(known & free & (labels == 0), spread(labels), labels)
+        np.copyto(labels, spread(labels.copy()), where=known & free & (labels == 0))
     labels = _numbered(labels)
     count = int(labels.max())
     area = totals(labels, count + 1) * CELL**2
@@ -198,7 +202,7 @@ def _without_small_things(free: Mask) -> Mask:
     sizes = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) * CELL
     small = (sizes < _FURNITURE) & ~_at_edge(stats, free.shape)
     small[0] = False
-    return np.asarray(free | small[pieces])
+    return np.asarray(free | looked_up(small, pieces))
 
 
 def _at_edge(stats: NDArray[Any], shape: tuple[int, ...]) -> Mask:
@@ -218,11 +222,10 @@ def _saddles(free: Mask, clearance: NDArray[np.float32]) -> list[tuple[int, int,
         return []
     from skimage.segmentation import watershed  # takes 0.3 s: most only show a place
 
-    rows, columns = clearance.shape
-    even = np.pad(clearance, ((0, rows % 2), (0, columns % 2)))
-    squares = np.maximum(
-        np.maximum(even[::2, ::2], even[1::2, ::2]), np.maximum(even[::2, 1::2], even[1::2, 1::2])
-    )
+    squares = clearance[::2, ::2].copy()
+    for shifted in (clearance[1::2, ::2], clearance[::2, 1::2], clearance[1::2, 1::2]):
+        inside = squares[: shifted.shape[0], : shifted.shape[1]]
+        np.maximum(inside, shifted, out=inside)
     basins = watershed(-squares, _widest_places(squares), mask=squares > 0)
     peaks = np.zeros(int(basins.max()) + 1, np.float32)
     np.maximum.at(peaks, basins.ravel(), squares.ravel())
@@ -242,8 +245,8 @@ def _saddles(free: Mask, clearance: NDArray[np.float32]) -> list[tuple[int, int,
     for first, second, cell in narrow:
         if _root(into, first) != _root(into, second):
             row, column = (2 * each for each in divmod(cell, squares.shape[1]))
-            square = even[row : row + 2, column : column + 2]
-            up, right = divmod(int(np.argmax(square)), 2)
+            square = clearance[row : row + 2, column : column + 2]
+            up, right = divmod(int(np.argmax(square)), square.shape[1])
             found.append((row + up, column + right, float(square[up, right]) / CELL))
     return found
 
@@ -302,31 +305,15 @@ def _meeting(
     return found
 
 
-def spread(labels: Labels) -> Labels:
-    """Return the label of the nearest cell that has one, for each cell."""
-    if not labels.any():
-        return labels
-    nearest = cv2.distanceTransformWithLabels(
-        (labels == 0).astype(np.uint8),
-        cv2.DIST_L2,
-        cv2.DIST_MASK_5,
-        labelType=cv2.DIST_LABEL_PIXEL,
-    )[1]
-    seeds = labels > 0
-    of_seed = np.zeros(int(nearest.max()) + 1, np.int32)
-    of_seed[nearest[seeds]] = labels[seeds]
-    # In place, as such a field of a large map takes 64 MB; clipping needs no copy.
-    return np.asarray(np.take(of_seed, nearest, out=nearest, mode='clip'))
-
-
 def _with_floor_below_furniture(labels: Labels, free: Mask) -> Labels:
     """Return labels that cover furniture and the small closed parts of the floor, too."""
     pieces, stats = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4)[1:3]
     tiny = stats[:, cv2.CC_STAT_AREA] * CELL**2 < SMALLEST_ROOM
     tiny[0] = False
-    closed = tiny[pieces]
+    closed = looked_up(tiny, pieces)
+    del pieces
     if (free & ~closed).any():
-        labels = np.where(closed, 0, labels)
+        labels[closed] = 0
     else:
         closed = np.zeros_like(closed)  # the map has no larger part
     side = 2 * int(_THICK / CELL) + 1
@@ -339,12 +326,15 @@ def _with_floor_below_furniture(labels: Labels, free: Mask) -> Labels:
     furniture = sizes[:, cv2.CC_STAT_AREA] * CELL**2 < SMALLEST_ROOM + 1
     furniture &= ~_at_edge(sizes, free.shape)
     furniture[0] = False
-    below = (furniture[blocks] | closed) & (labels == 0)
+    below = (looked_up(furniture, blocks) | closed) & (labels == 0)
     if not below.any():
         return labels
-    del blocks, closed, thick
+    del blocks, closed, thick, solid
     below &= distance_to(labels > 0, CELL) <= _BENEATH
-    return np.where(below, spread(labels), labels)
+    elsewhere = (labels == 0) & ~below
+    labels = spread(labels)
+    labels[elsewhere] = 0
+    return labels
 
 
 def _numbered(labels: Labels) -> Labels:
@@ -355,4 +345,4 @@ def _numbered(labels: Labels) -> Labels:
         first.append((rows.start, int(np.argmax(upright[rows.start] == number)), number))
     numbers = np.zeros(int(labels.max()) + 1, np.int32)
     numbers[[number for _, _, number in sorted(first)]] = np.arange(1, len(first) + 1)
-    return np.asarray(numbers[labels])
+    return looked_up(numbers, labels)

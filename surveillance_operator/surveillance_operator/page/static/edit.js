@@ -8,7 +8,7 @@ const {live, control, guard} = document.documentElement.dataset;
 $('live-link').hidden = live !== '1';
 if (live === '1') startHead({control: control === '1', guard: guard === '1'});
 const TOOLS = {
-  select: ['Select', 'v', 'Tap a room, a door or a zone; drag its handle to move it; drag the floor to look around. Dashed doors are doubtful.'],
+  select: ['Select', 'v', 'Tap a room, a door or a zone; drag its handle to move it; drag the floor to look around. Dashed doors and ringed rooms are doubtful.'],
   cut: ['Cut', 'c', 'Draw a line through a room, or tap its two ends. It is carried on to the walls.'],
   join: ['Join', 'j', 'Tap a door: the rooms on both sides become one. Or tap a room, then the one that becomes a part of it.'],
   wall: ['Wall', 'x', 'Tap a door: a wall closes it.'],
@@ -100,6 +100,9 @@ function grip(kind, name, [x, y], more = {}) {
   return mark;
 }
 
+// Whether a room or a door is to be looked at.
+const doubts = ({confidence}) => confidence !== null && confidence < place.sure;
+
 function word(text, [x, y], size, dy = 0) {
   const p = pixel();
   return s('text', {x, y: -y + dy * p, 'font-size': size * p, 'stroke-width': 3 * p}, text);
@@ -117,15 +120,17 @@ function draw() {
   layers.zones.replaceChildren(...Object.entries(place.zones).map(([name, zone]) => s('path', {
     class: `zone ${zone.kind}${is('zone', name) ? ' on' : ''}`, d: path(zone.corners), 'stroke-width': 2 * p, 'data-kind': 'zone', 'data-name': name})));
   layers.doors.replaceChildren(...Object.entries(place.doors).map(([name, {line: [x1, y1, x2, y2]}]) => s('line', {
-    class: `door${is('door', name) ? ' on' : ''}${place.doubtful.includes(`door ${name}`) ? ' doubtful' : ''}`, x1, y1: -y1, x2, y2: -y2, 'stroke-width': 4 * p, 'data-kind': 'door', 'data-name': name})));
+    class: `door${is('door', name) ? ' on' : ''}${doubts(place.doors[name]) ? ' doubtful' : ''}`, x1, y1: -y1, x2, y2: -y2, 'stroke-width': 4 * p, 'data-kind': 'door', 'data-name': name})));
   const grips = [];
   const words = [];
   for (const [name, {at}] of Object.entries(place.doors)) {
     grips.push(grip('door', name, at));
     if (p < 0.03) words.push(word(name, at, 10, -12));
   }
-  for (const [room, {point, keep_out: barred}] of Object.entries(place.rooms)) {
+  for (const [room, each] of Object.entries(place.rooms)) {
+    const {point, keep_out: barred} = each;
     grips.push(grip('room', room, point));
+    if (doubts(each)) words.push(s('circle', {class: 'doubtful', cx: point[0], cy: -point[1], r: 14 * p, 'stroke-width': 2 * p}));
     words.push(word(barred ? `${room} (kept out of)` : room, point, 14, -13));
   }
   for (const [room, pose] of Object.entries(place.stations)) {
@@ -276,7 +281,7 @@ function panel() {
   if (chosen && !FIELDS[chosen.kind]) chosen = null;
   const table = chosen && {room: place.rooms, door: place.doors, zone: place.zones, station: place.stations, marker: place.markers, left_out: place.left_out}[chosen.kind];
   if (table && !(chosen.name in table)) chosen = null;
-  const shows = JSON.stringify([chosen, table?.[chosen?.name], place.start, place.quiet_hours, place.time_zone, names(place.rooms)]);
+  const shows = JSON.stringify([chosen, table?.[chosen?.name], place.start, place.quiet_hours, place.time_zone, names(place.rooms), place.changes]);
   $('file').textContent = place.file.split('/').at(-1);
   $('changed').textContent = place.changed ? 'changed, not saved' : 'as saved';
   document.title = (place.changed ? '• ' : '') + $('file').textContent;
@@ -292,6 +297,11 @@ function panel() {
   else form.append(h('p', {class: 'note'}, 'Choose something on the floor or in the list.'));
   $('chosen').replaceChildren(form);
   $('whole-place').replaceChildren(h('h3', {}, 'The whole place'), ...WHOLE().map((each) => field(each)));
+  $('changes').hidden = !place.changes.length;
+  $('changes').replaceChildren(h('h3', {}, 'Changed since the older map'), h('ul', {}, ...place.changes.map(({kind, name, said, back}) => h('li', {},
+    h('button', {type: 'button', class: 'text', disabled: !(kind === 'room' ? place.rooms : place.doors)[name], onclick: () => show(kind, name)}, said),
+    ...(back ? [h('button', {type: 'button', disabled: !may, 'aria-label': `Keep as it was: ${kind} ${name}`, onclick: () => send('keep_old', {name})}, 'As it was')] : []),
+    h('button', {type: 'button', disabled: !may, 'aria-label': `Take: ${kind} ${name}`, onclick: () => send('take_new', {name})}, 'Take')))));
   $('next-doubtful').hidden = !place.doubtful.length;
   $('next-doubtful').textContent = `Next of ${place.doubtful.length} doubtful (n)`;
   const listed = [['room', place.rooms], ['door', place.doors], ['zone', place.zones], ['station', place.stations], ['marker', place.markers], ['left_out', place.left_out]];
@@ -304,7 +314,10 @@ function nextDoubtful() {
   const now = place.doubtful.indexOf(chosen ? `${chosen.kind} ${chosen.name}` : '');
   const next = place.doubtful[(now + 1) % place.doubtful.length];
   if (!next) return;
-  const [kind, name] = next.split(' ');
+  show(...next.split(' '));
+}
+
+function show(kind, name) {
   const [x, y] = kind === 'door' ? place.doors[name].at : place.rooms[name].point;
   view = {...view, x, y, span: Math.min(view.span, 12)};
   choose({kind, name});
