@@ -175,7 +175,8 @@ class CaseJoins:
 
     def _apply(self, plan: _Plan, nodes: tuple[int, ...], choices: Choices) -> None:
         """Apply a rule wherever the atom that the plan begins with stands for certain nodes."""
-        if any(map(self._model.is_gone, nodes)) or not all(map(self._may_hold, plan.props)):
+        model = self._model
+        if any(map(model.is_gone, nodes)) or not all(_may_hold(model, p) for p in plan.props):
             return
         self._origin = plan.rule.origin
         self._model.budget.at_work = self._name_rule
@@ -186,12 +187,6 @@ class CaseJoins:
         for match in [match for first in found for match in self._joined(plan.order, 0, first)]:
             self._model.step()
             self._fire(plan.rule, match)
-
-    def _may_hold(self, prop: str) -> bool:
-        """Tell whether anybody may have a value by a property that is joined already."""
-        having, rejoin = self._model.having[prop], self._model.rejoin
-        # Where many have one it costs more to look than to join.
-        return len(having) > _FEW or any(x not in rejoin for x in having)
 
     def _joined(self, order: tuple[NamedAtom, ...], place: int, match: _Match) -> Iterator[_Match]:
         """Return the ways in which all atoms from a place on hold."""
@@ -502,6 +497,13 @@ class _Plan(NamedTuple):
     atom: FactAtom
     order: tuple[NamedAtom, ...]
     props: tuple[str, ...]
+
+
+def _may_hold(model: CaseModel, prop: str) -> bool:
+    """Tell whether anybody may have a value by a property that is joined already."""
+    having, rejoin = model.having[prop], model.rejoin
+    # Where many have one it costs more to look than to join.
+    return len(having) > _FEW or any(x not in rejoin for x in having)
 
 
 def _ordered(body: Iterable[NamedAtom], given: FactAtom) -> tuple[NamedAtom, ...]:
