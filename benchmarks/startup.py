@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How long a start takes, and what the running robot needs.
 
-Warm: from the command to the first chosen room, each node its own process and all in one, beside
+Warm: from the command to the first chosen room, with few processes, one each and one, beside
 the time of a bare `import rclpy` in the same run, and the processor time that all processes have
 used by then, which other work on the machine changes little. `resumed`: the mission goes on after
 launcher and nodes were killed. `--cold` also measures a start from nothing, in a fresh copy of the
@@ -29,14 +29,16 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 if str(CHECKOUT) not in sys.path:
     sys.path.insert(0, str(CHECKOUT))
 
+from benchmarks.processes import STARTED, proportional_size
 from benchmarks.sizes import Size, sized_parser
 from launcher.process_watch import look_at
+from surveillance_runtime.node_table import COMPOSITIONS, FEW
 from surveillance_runtime.testing import claim_domain
 
 BASE_PYTHON = str(getattr(sys, '_base_executable', sys.executable))
+NOTE = ', start not explored'
 NO_EXPLORING = '/**/robot_behavior:\n  ros__parameters:\n    exploration_seconds: 0.0\n'
 CHOSEN = re.compile(r'robot_behavior +\| decision 1:')
-STARTED = re.compile(r'started (\w+) \(process (\d+)\)')
 LONGEST = 60.0
 
 
@@ -69,33 +71,25 @@ def launch(checkout: Path, *options: str, longest: float = LONGEST, kill: bool =
         text=True,
         cwd=checkout,
     )
-    processes = {'launch.py': process.pid}
+    processes = {process.pid: 'launch.py'}
     assert process.stdout is not None
     lines = []
     try:
         for line in process.stdout:
             lines.append(line)
             if match := STARTED.search(line):
-                processes[match[1]] = int(match[2])
+                processes.setdefault(int(match[2]), match[1])
             if CHOSEN.search(line):
                 seconds = time.monotonic() - begin
-                cpu = sum(look.cpu for pid in processes.values() if (look := look_at(pid)))
-                memory = {name: proportional_size(pid) for name, pid in processes.items()}
+                cpu = sum(look.cpu for pid in processes if (look := look_at(pid)))
+                memory = {name: proportional_size(pid) for pid, name in processes.items()}
                 return Start(seconds, cpu, memory)
     finally:
-        for pid in reversed(processes.values()) if kill else ():
+        for pid in reversed(processes) if kill else ():
             os.kill(pid, signal.SIGKILL)
         process.send_signal(signal.SIGINT)
         process.communicate()
     sys.exit(f'no room was chosen within {longest:.0f} s:\n' + ''.join(lines[-20:]))
-
-
-def proportional_size(pid: int) -> float:
-    """Return the memory of a process in MB, pages shared with others counted in part."""
-    text = Path(f'/proc/{pid}/smaps_rollup').read_text()
-    match = re.search(r'^Pss: +(\d+) kB', text, re.MULTILINE)
-    assert match is not None
-    return int(match[1]) / 1000
 
 
 def time_of(words: list[str], environ: dict[str, str]) -> float:
@@ -138,15 +132,14 @@ def main() -> None:
         at_once = ['--params', parameters.name]
         domain = ['--domain', str(claim_domain())]
         kinds = {
-            'processes': domain,
-            'processes, start not explored': [*domain, *at_once],
-            'composed': [*domain, '--composed'],
-            'composed, start not explored': [*domain, '--composed', *at_once],
+            f'{how}{note}': [*domain, '--processes', how, *more]
+            for how in COMPOSITIONS
+            for note, more in (('', []), (NOTE, at_once))
         }
         starts = {
             kind: [launch(CHECKOUT, *words) for _ in range(repeats)]
             for kind, words in kinds.items()
-            if options.size is not Size.SMOKE or kind == 'composed, start not explored'
+            if options.size is not Size.SMOKE or kind == f'{FEW}{NOTE}'
         }
     if options.size is not Size.SMOKE:
         starts['resumed'] = [resumed(domain) for _ in range(repeats)]
@@ -161,7 +154,7 @@ def main() -> None:
         print(f'{name:<40} {seconds:>8.2f} {seconds / bare:>9.1f} {cpu:>12.2f}')
     print('\nmemory at that moment, PSS')
     print(f'{"process":<40} {"MB":>8}')
-    for kind in starts.keys() & {'processes', 'composed'} or starts:
+    for kind in starts.keys() & {*COMPOSITIONS} or starts:
         memory = starts[kind][-1].memory
         for name, size in memory.items():
             print(f'{kind + ": " + name:<40} {size:>8.1f}')

@@ -157,9 +157,6 @@ class Supervisor:
         self.children = {
             program.name: RunningProcess(program, Restarts(pauses)) for program in programs
         }
-        self._holders = {
-            node: child for child in self.children.values() for node in child.program.names
-        }
         self._to_start: list[RunningProcess] = []
         self._at_once = at_once or (os.cpu_count() or 1) + 1
         self._log = log
@@ -206,7 +203,7 @@ class Supervisor:
 
     def send(self, name: str, line: str) -> bool:
         """Write a line to the input of the program that holds a node; return whether it lives."""
-        process = self._holders[name].process
+        process = next(c.process for c in self.children.values() if name in c.program.names)
         if process is None or process.stdin is None:
             return False
         try:
@@ -386,9 +383,8 @@ class Supervisor:
         for each in child.program.names:
             self._log.warn(f'{each} died ({why}): starting it again{when}')
         if trouble := child.restarts.trouble(now):
-            text = f'{name} {trouble}, last: {why}'
-            self._log.error(f'{text}: a person should look at it')
-            self._on_trouble(child.program.names, text)
+            self._log.error(f'{name} {trouble}, last: {why}: a person should look at it')
+            self._on_trouble(child.program.names, f'{name} {trouble}, last: {why}')
 
     def _watch(self, now: float) -> None:
         """End what hangs or holds too much memory; it is started again as after a death."""
