@@ -455,6 +455,24 @@ def test_a_full_disk_behind_a_locked_file_loses_nothing_once_both_are_over(
     assert names(server.ask('QUERY IND CLASS', 'DOOR')) == ['A', 'B', 'C']
 
 
+def test_a_spill_that_cannot_be_removed_is_merged_once(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with closing(sqlite3.connect(server.path, isolation_level=None)) as other:
+        other.execute('BEGIN IMMEDIATE')
+        server.ask('ADD IND CLASS', 'A', 'DOOR')
+        other.execute('ROLLBACK')
+    with monkeypatch.context() as patch:
+        patch.setattr(Spill, 'clear', full)
+        file = server.store._files['map']
+        while file.is_behind:
+            with file.ref.lock:
+                file.attend()
+        assert server.ask('REMOVE IND CLASS', 'A', 'DOOR').success
+    server.restart()
+    assert not names(server.ask('QUERY IND CLASS', 'DOOR'))
+
+
 WRITER = """
 import sys
 from pathlib import Path

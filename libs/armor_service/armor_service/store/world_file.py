@@ -644,7 +644,9 @@ class WorldFile:
             if self._told_failure:
                 self._told_failure = False
                 self._warn(f'{self.path}: can be written again, every change is kept')
-        self._spill.clear()
+        # What stays there is known by its number to be in the file.
+        with suppress(OSError):
+            self._spill.clear()
 
     def _keep_aside(self) -> None:
         """Append what was answered to the spill; it waits in memory where that cannot be, too."""
