@@ -75,9 +75,10 @@ def test_words_are_the_fields(page: Any) -> None:
 
 
 def test_the_whole_is_short_and_has_code() -> None:
-    total = sum(page.words for page in PAGES)
-    assert total <= 35_000
-    assert 1000 * sum(page.marks for page in PAGES) / total >= 15
+    read = [page for page in PAGES if not page.name.endswith('measurements.md')]
+    total = sum(page.words for page in read)
+    assert total <= 29_500
+    assert 1000 * sum(page.marks for page in read) / total >= 18
 
 
 @pytest.mark.parametrize('path', [p for p in DONE if 'how-to' in p.parts], ids=lambda p: p.stem)
