@@ -41,7 +41,6 @@ _WAITS, _TRIES = 10.0, 3
 more; so often."""
 _BLIND_SPOT = 'what lies behind cannot be seen from beside it'
 _TOO_NARROW = 'the robot does not fit there'
-_FOR_GOOD = _BLIND_SPOT, _TOO_NARROW
 _ALL_AROUND = 6.0
 """A lidar that sees less than this, rad, turns once before the first drive."""
 
@@ -308,7 +307,7 @@ class Exploration:
     def _is_barred(self) -> bool:
         """Tell whether something is left only because of what stood in the way, maybe people."""
         reasons = {self._why(each) for each in self._left if each.viewpoint is None}
-        return self._tries < _TRIES and bool(reasons - set(_FOR_GOOD))
+        return self._tries < _TRIES and bool(reasons - {_BLIND_SPOT})
 
     def _waits(self) -> bool:
         """Stand for a while; tell whether it still does. Then what was barred is tried again."""
@@ -320,7 +319,11 @@ class Exploration:
             return True
         self._waits_until = None
         self._tries += 1
-        self._spent = [each for each in self._spent if each[1] in _FOR_GOOD]
+        self._spent = [each for each in self._spent if each[1] == _BLIND_SPOT]
+        # Who stood in a doorway is in the map until it is seen without them.
+        with self._lock:
+            self._pending, self._looked = self._scan, True
+        self._map()
         return False
 
     def _mend(self) -> bool:

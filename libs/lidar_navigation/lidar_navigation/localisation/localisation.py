@@ -257,7 +257,8 @@ class Localiser:
         A pose that something new explains is kept, however well another one fits.
         """
         margin = CHANCE if self._shaken else SURE
-        if not evidence.refutes or not self._belief.follow_best(margin):
+        is_kept = not (self._shaken or evidence.refutes)
+        if is_kept or not self._belief.follow_best(margin):
             return evidence
         self.jumps += 1
         return self._fit.evidence(self.pose, thin.thinned(self.parameters.cast_rays))
