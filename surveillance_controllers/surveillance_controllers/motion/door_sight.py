@@ -27,7 +27,7 @@ READINGS, AGREEING = 8, 7
 """So many of the last readings must agree."""
 AT_ONCE = 10.0
 """Readings that are older than this say nothing of now, seconds."""
-COUNTS_FOR = 30.0, 600.0
+COUNTS_FOR = 30.0, 120.0
 """A shut door counts for at least and at most this long after it was seen so last, seconds."""
 _SURE = 0.8
 """A reading that is less likely than this says nothing."""
