@@ -16,7 +16,6 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from floor_plans.editor import PlaceEditor
-from floor_plans.map_rooms.confidence import DOUBTFUL
 from floor_plans.parameters import CLASSES
 from surveillance_operator.page.server import Action
 
@@ -179,7 +178,7 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
                 'hours': hours.get(room, ''),
                 'keep_out': room in rules.calendar.keep_out,
                 'sweep': room in rules.swept,
-                'confidence': now.confidence.get(room),
+                'doubtful': now.is_doubtful(room),
             }
             for room, doors in place.rooms.items()
         },
@@ -188,7 +187,7 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
                 'at': [door.x, door.y, door.yaw, door.width],
                 'line': list(door.segment),
                 'joins': list(place.doors[name]),
-                'confidence': now.confidence.get(name),
+                'doubtful': now.is_doubtful(name),
             }
             for name, door in plan.doors.items()
         },
@@ -217,7 +216,6 @@ def shown(editor: PlaceEditor) -> dict[str, Any]:
             {'kind': each.kind, 'name': each.name, 'said': each.said, 'back': bool(each.keep)}
             for each in editor.changes
         ],
-        'sure': DOUBTFUL,
         'doubtful': [f'{kind} {name}' for kind, name in now.doubtful],
         'start': place.start,
         'quiet_hours': described.get('quiet_hours', ''),

@@ -6,6 +6,6 @@ checks each change as the file would be checked, and writes the file with its co
 `changes` compares with an older place of the building.
 """
 
-from floor_plans.editor.changes import Change as Change
+from floor_plans.editor.changes import PlaceChange as PlaceChange
 from floor_plans.editor.changes import changes_between as changes_between
 from floor_plans.editor.editor import PlaceEditor as PlaceEditor

@@ -28,7 +28,7 @@ _MOST_POINTS = 2000
 
 
 @dataclass(frozen=True)
-class Change:
+class PlaceChange:
     """A room or a door that only one of two places has.
 
     Attributes:
@@ -53,7 +53,7 @@ class Change:
 
 def changes_between(
     older: FloorPlan, described: Mapping[str, Any], newer: FloorPlan, lies: Alignment
-) -> tuple[Change, ...]:
+) -> tuple[PlaceChange, ...]:
     """Return what has changed, rooms first.
 
     Args:
@@ -64,29 +64,29 @@ def changes_between(
     """
     old, new = RoomMap(older), RoomMap(newer)
     was, now = older.place, newer.place
-    found: list[Change] = []
+    found: list[PlaceChange] = []
     for room in now.rooms:
         if room not in was.rooms:
             before = _mostly_in(new, room, lies.to_old, old)
             doors = set(now.rooms.get(before or '', ())) & set(now.rooms[room])
             steps: tuple[Step, ...] = (('join', {'first': before, 'second': room}),)
             said = f'room {room} is new' + (f': it was a part of {before}' if before else '')
-            found.append(Change('room', room, True, said, steps if doors else ()))
+            found.append(PlaceChange('room', room, True, said, steps if doors else ()))
     for room in was.rooms:
         if room not in now.rooms:
             there = _mostly_in(old, room, lies.to_new, new)
             steps = _cut_off(older, described, lies, room, there) if there else ()
             said = f'room {room} is gone: ' + (f'it is a part of {there}' if there else 'no floor')
-            found.append(Change('room', room, False, said, steps))
+            found.append(PlaceChange('room', room, False, said, steps))
     both = was.rooms.keys() & now.rooms.keys()
     for door, sides in now.doors.items():
         if door not in was.doors and len(sides) == 2 and set(sides) <= both:
             said = f'door {door} is new: it joins {sides[0]} and {sides[1]}'
-            found.append(Change('door', door, True, said, (('wall_off', {'name': door}),)))
+            found.append(PlaceChange('door', door, True, said, (('wall_off', {'name': door}),)))
     for door, sides in was.doors.items():
         if door not in now.doors and len(sides) == 2 and set(sides) <= both:
             said = f'door {door} is gone: the newer map is closed between {sides[0]} and {sides[1]}'
-            found.append(Change('door', door, False, said, ()))
+            found.append(PlaceChange('door', door, False, said, ()))
     return tuple(found)
 
 

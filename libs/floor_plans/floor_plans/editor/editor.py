@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from floor_plans.description import described_in, map_file_beside
-from floor_plans.editor.changes import Change
+from floor_plans.editor.changes import PlaceChange
 from floor_plans.editor.operations import OPERATIONS, Draft, checked_fields
 from floor_plans.floor_plan import FloorPlan
 from floor_plans.map_rooms.confidence import DOUBTFUL, confidence
@@ -73,6 +73,10 @@ class Moment:
         }
         return confidence(areas, doors)
 
+    def is_doubtful(self, name: str) -> bool:
+        """Tell whether a room or a door is to be looked at."""
+        return self.confidence.get(name, 1.0) < DOUBTFUL
+
     @cached_property
     def doubtful(self) -> tuple[tuple[str, str], ...]:
         """The doors of a map to be looked at first, the least sure first; what makes a room
@@ -105,7 +109,7 @@ class PlaceEditor:
         more_checks: Callable[[Place], Any] = lambda _: None,
     ) -> None:
         self.path = path
-        self._changes: dict[str, Change] = {}
+        self._changes: dict[str, PlaceChange] = {}
         self._radius = radius
         self._more_checks = more_checks
         self._map: OccupancyMap | None = None
@@ -174,11 +178,11 @@ class PlaceEditor:
         return ''
 
     @property
-    def changes(self) -> tuple[Change, ...]:
+    def changes(self) -> tuple[PlaceChange, ...]:
         """What has changed since an older place and nobody has decided yet."""
         return tuple(each for each in self._changes.values() if each.is_open(self.now.plan))
 
-    def decide(self, changes: Sequence[Change]) -> None:
+    def decide(self, changes: Sequence[PlaceChange]) -> None:
         """Have each of these decided by a person: `keep_old` or `take_new`."""
         self._changes = {each.name: each for each in changes}
 
@@ -206,7 +210,7 @@ class PlaceEditor:
         del self._changes[name]
         return f'taken: {change.said}'
 
-    def _change(self, name: str) -> Change:
+    def _change(self, name: str) -> PlaceChange:
         known = {each.name: each for each in self.changes}
         if name not in known:
             raise ValueError(f'no change {name!r}: expected {nearest(name, known)}')

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from floor_plans.description import described_in, read_place
-from floor_plans.editor import Change, changes_between
+from floor_plans.editor import PlaceChange, changes_between
 from floor_plans.floor_plan import Door, FloorPlan
 from floor_plans.map_rooms import Proposal
 from floor_plans.occupancy_grid import Grid, distance_to
@@ -109,7 +109,7 @@ def alignment(old: Grid, new: Grid) -> Alignment:
 
 def changes_since(
     older: Path, newer: FloorPlan, radius: float, lies: Alignment | None = None
-) -> tuple[Change, ...]:
+) -> tuple[PlaceChange, ...]:
     """Return what has changed since an older place of a building.
 
     Args:

@@ -100,9 +100,6 @@ function grip(kind, name, [x, y], more = {}) {
   return mark;
 }
 
-// Whether a room or a door is to be looked at.
-const doubts = ({confidence}) => confidence !== null && confidence < place.sure;
-
 function word(text, [x, y], size, dy = 0) {
   const p = pixel();
   return s('text', {x, y: -y + dy * p, 'font-size': size * p, 'stroke-width': 3 * p}, text);
@@ -120,17 +117,16 @@ function draw() {
   layers.zones.replaceChildren(...Object.entries(place.zones).map(([name, zone]) => s('path', {
     class: `zone ${zone.kind}${is('zone', name) ? ' on' : ''}`, d: path(zone.corners), 'stroke-width': 2 * p, 'data-kind': 'zone', 'data-name': name})));
   layers.doors.replaceChildren(...Object.entries(place.doors).map(([name, {line: [x1, y1, x2, y2]}]) => s('line', {
-    class: `door${is('door', name) ? ' on' : ''}${doubts(place.doors[name]) ? ' doubtful' : ''}`, x1, y1: -y1, x2, y2: -y2, 'stroke-width': 4 * p, 'data-kind': 'door', 'data-name': name})));
+    class: `door${is('door', name) ? ' on' : ''}${place.doors[name].doubtful ? ' doubtful' : ''}`, x1, y1: -y1, x2, y2: -y2, 'stroke-width': 4 * p, 'data-kind': 'door', 'data-name': name})));
   const grips = [];
   const words = [];
   for (const [name, {at}] of Object.entries(place.doors)) {
     grips.push(grip('door', name, at));
     if (p < 0.03) words.push(word(name, at, 10, -12));
   }
-  for (const [room, each] of Object.entries(place.rooms)) {
-    const {point, keep_out: barred} = each;
+  for (const [room, {point, keep_out: barred, doubtful}] of Object.entries(place.rooms)) {
     grips.push(grip('room', room, point));
-    if (doubts(each)) words.push(s('circle', {class: 'doubtful', cx: point[0], cy: -point[1], r: 14 * p, 'stroke-width': 2 * p}));
+    if (doubtful) words.push(s('circle', {class: 'doubtful', cx: point[0], cy: -point[1], r: 14 * p, 'stroke-width': 2 * p}));
     words.push(word(barred ? `${room} (kept out of)` : room, point, 14, -13));
   }
   for (const [room, pose] of Object.entries(place.stations)) {
