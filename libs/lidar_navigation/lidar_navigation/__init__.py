@@ -5,7 +5,7 @@ comes out. `localisation` says where the robot is, `planning` finds paths, `driv
 `exploration` maps a building. What this module lists is public, and imported when it is first used.
 
 Public modules: `geometry`, `robot_base`, `coverage`, `driving.path_following`,
-`exploration.scan_matching`, `localisation.odometry`, `testing`.
+`exploration.scan_matching`, `localisation.odometry`, `localisation.scan_fit`, `testing`.
 """
 
 from __future__ import annotations

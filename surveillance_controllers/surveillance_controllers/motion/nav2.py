@@ -57,7 +57,7 @@ from surveillance_controllers.motion.nav2_goals import (
     reason_of,
 )
 from surveillance_controllers.motion.place_recording import PlaceRecorder
-from surveillance_controllers.motion.pose_doubt import PoseDoubt, PoseTrace
+from surveillance_controllers.motion.pose_doubt import PoseDoubt
 from surveillance_runtime.conversions import (
     pose_estimate,
     pose_from,
@@ -192,10 +192,7 @@ class Nav2Motion:
         knowledge.follow_places(self._set_positions)
         self._tf = FramesHeard(node)
         self._own_poses: Any = None
-        self._doubt, self._trace = PoseDoubt(), PoseTrace()
-        # A scan and its stamp, until the pose of that time is told.
-        self._scan: tuple[Scan, float] | None = None
-        self._looked_at = -math.inf
+        self._doubt = PoseDoubt()
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
         StateSubscription(
             node,
@@ -206,10 +203,8 @@ class Nav2Motion:
         )
         self._doors = DoorTeller(node, door_segments(node))
         self._seen_from: tuple[Pose, float] | None = None
-        self._lidar = ScanReader(
-            node, node.declare_fields(_RadiusSetting()).radius, self._frames.base
-        )
-        self._lidar.subscribe(self._on_scan)
+        lidar = ScanReader(node, node.declare_fields(_RadiusSetting()).radius, self._frames.base)
+        lidar.subscribe(self._on_scan)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(POSE_PERIOD, self._look, clock=steady)
 
@@ -329,7 +324,7 @@ class Nav2Motion:
             pose, stamp = found
             self._take(pose)
             self._publish(pose, stamp)
-            self._trace.add(stamp, pose)
+            self._doubt.trace.add(stamp, pose)
             self._compare()
         if self._drive is not None:
             progress, stalled, run = self._drive
@@ -342,9 +337,9 @@ class Nav2Motion:
         """Read the doors by a scan, if it is known from where it was made; keep one a second to
         compare it with the map.
         """
-        if time.monotonic() - self._looked_at >= LOOK_AT_SCANS:
-            self._looked_at = time.monotonic()
-            self._scan = scan, seconds_of(message.header.stamp)
+        if time.monotonic() - self._doubt.looked_at >= LOOK_AT_SCANS:
+            self._doubt.looked_at = time.monotonic()
+            self._doubt.scan = scan, seconds_of(message.header.stamp)
         found = self._tf.pose(self._frames.base, self._frames.map, FRESH)
         before, self._seen_from = self._seen_from, None
         if found is None:
@@ -393,10 +388,10 @@ class Nav2Motion:
 
     def _compare(self) -> None:
         """Compare a scan with the map, from where the robot was said to be then."""
-        if self._scan is None or not self._trace.is_past(self._scan[1]):
+        if self._doubt.scan is None or not self._doubt.trace.is_past(self._doubt.scan[1]):
             return
-        (scan, stamp), self._scan = self._scan, None
-        pose = self._trace.at(stamp)
+        (scan, stamp), self._doubt.scan = self._doubt.scan, None
+        pose = self._doubt.trace.at(stamp)
         if pose is None:
             return
         if self._doubt.look(pose, scan, stamp):

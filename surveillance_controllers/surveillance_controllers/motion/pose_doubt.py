@@ -6,6 +6,7 @@ to tell a pose, sure of itself. Rays that go on through walls of the map, seen f
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from itertools import pairwise
 
@@ -70,12 +71,18 @@ class PoseDoubt:
 
     Attributes:
         in_doubt: Whether the pose has not fitted for a while.
+        trace: Where the robot was said to be.
+        scan: A scan and its stamp, until the pose of that time is told.
+        looked_at: When it came, steady seconds.
     """
 
     def __init__(self) -> None:
         self._fit: ScanFit | None = None
         self._since: float | None = None
         self.in_doubt = False
+        self.trace = PoseTrace()
+        self.scan: tuple[Scan, float] | None = None
+        self.looked_at = -math.inf
 
     def set_map(self, grid: Grid) -> None:
         """Take the map that the pose is told in."""
