@@ -27,7 +27,7 @@ from launcher.fleet_launch import RobotProcesses, parts
 from launcher.run import NOT_RECORDED, Run
 from launcher.run_configuration import configuration, profile_of
 from launcher.run_processes import node_environ, programs_of, ros_arguments
-from surveillance_runtime import logging
+from surveillance_runtime import logging, node_table
 from surveillance_runtime.configuration import split_arguments
 from surveillance_runtime.node import PatrolNode, give_arguments
 from surveillance_runtime.process import ExecutorThread, share_clock
@@ -75,7 +75,7 @@ class FleetStack:
             mode='SIMULATED',
             place=place,
             robots=count,
-            composed=True,
+            processes=node_table.ONE,
             record=NOT_RECORDED,
             domain=domain,
             assignments=('use_sim_time:=true', 'simulator:speed:=0.0', *assignments),

@@ -24,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -101,7 +101,7 @@ class Threads:
         count: How many threads of that name there are.
     """
 
-    cpu: Counter[str] = field(default_factory=Counter)
+    cpu: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     woken: Counter[str] = field(default_factory=Counter)
     count: Counter[str] = field(default_factory=Counter)
 

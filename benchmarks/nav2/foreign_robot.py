@@ -71,7 +71,7 @@ class ForeignRobot(Node):
         self._silent_until = -math.inf
         self._stepped_at = time.monotonic()
         self._way = 0.0
-        self._map_to_odom = None
+        self._map_to_odom: tuple[float, float, float] | None = None
         self._tf = self.create_publisher(TFMessage, 'tf', 100)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._fixed = self.create_publisher(TFMessage, 'tf_static', latched)
