@@ -287,10 +287,15 @@ def _own_folder(node: PatrolNode, place: str) -> Path:
     return state_folder() / 'armor' / own
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node as a process."""
+def prepare_process() -> None:
+    """Set what holds for the whole process that this node runs in, alone or with others."""
     # A LOAD runs for seconds in Python; others are to get the interpreter often meanwhile.
     sys.setswitchinterval(SWITCH_INTERVAL)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node as a process."""
+    prepare_process()
     return run_node(partial(ArmorServer, keep=True), args)
 
 

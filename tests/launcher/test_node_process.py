@@ -37,3 +37,27 @@ def test_a_child_whose_launcher_is_gone_already_does_not_start():
         check=False,
     )
     assert done.returncode == 1
+
+
+def test_what_a_node_wants_of_its_process_counts_beside_others_too(tmp_path):
+    (tmp_path / 'one_node.py').write_text(
+        'import surveillance_runtime.process as process\n'
+        'def prepare_process(): print("prepared", flush=True)\n'
+        'class Node: pass\n'
+        'process.run_nodes = lambda classes, arguments: print("run", len(classes)) or 0\n'
+    )
+    done = subprocess.run(
+        [
+            sys.executable,
+            '-P',
+            str(ROOT / 'launcher' / 'node_process.py'),
+            '0',
+            'a=one_node:Node,b=one_node:Node',
+        ],
+        env=USER_ENVIRON | {'PYTHONPATH': str(tmp_path)},
+        timeout=60.0,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.split('\n')[-2:-1] == ['run 2'] and 'prepared' in done.stdout
