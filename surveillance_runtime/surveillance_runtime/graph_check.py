@@ -239,17 +239,23 @@ class TopicListening:
 LOOK_PERIOD = 2.0
 """Seconds of real time between two looks for what is missing."""
 PATIENCE = 3.9
-"""What has not come after this is missing, seconds: it is told with the second look."""
+"""What has not come after this is missing, seconds: it is told with the third look."""
+MOST_COUNTED = 1.1 * LOOK_PERIOD
+"""Of the time between two looks at most this counts, seconds: in the rest nobody spun the node."""
 
 
 class InputWatch:
     """Tells what a node waits for, in the words of `doctor`, as incidents that end when it comes.
+
+    Only time in which the node could hear counts: from the first look on, without what an executor
+    stood still in.
 
     Args:
         node: The node.
         wanted: What it may wait for.
         missing: Returns which of their topics it waits for now.
         refused: Returns why what comes on one of them is of no use; empty: nothing comes.
+        now: Returns the steady time, seconds.
     """
 
     def __init__(
@@ -258,21 +264,28 @@ class InputWatch:
         wanted: Sequence[ExpectedTopic],
         missing: Callable[[], Iterable[str]],
         refused: Callable[[str], str] = lambda _topic: '',
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._node = node
         self._wanted = {each.topic: each for each in wanted}
         self._missing = missing
         self._refused = refused
-        self._since = {each.topic: time.monotonic() for each in wanted}
+        self._now = now
+        self._silent = {each.topic: 0.0 for each in wanted}
+        self._looked_at = math.inf
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(LOOK_PERIOD, self._look, clock=steady)
 
     def _look(self) -> None:
-        now, missing = time.monotonic(), set(self._missing())
+        now, missing = self._now(), set(self._missing())
+        listened = min(max(0.0, now - self._looked_at), MOST_COUNTED)
+        self._looked_at = now
         for topic in self._wanted.keys() - missing:
-            self._since[topic] = now
+            self._silent[topic] = 0.0
             self._node.incidents.end(('robot', topic), f'{topic}: it is as awaited')
-        late = [topic for topic in missing if now - self._since[topic] >= PATIENCE]
+        for topic in missing:
+            self._silent[topic] += listened
+        late = [topic for topic in missing if self._silent[topic] >= PATIENCE]
         if not late:
             return
         seen = endpoints_of(self._node)
@@ -280,6 +293,6 @@ class InputWatch:
             if why := self._refused(topic):
                 lines = [f'{topic}: what comes is of no use: {why}']
             else:
-                lines = list(findings(self._wanted[topic], seen, now - self._since[topic]))
+                lines = list(findings(self._wanted[topic], seen, round(self._silent[topic], 1)))
             if lines:
                 self._node.incidents.begin(('robot', topic), '; '.join(lines), Severity.ALARM)

@@ -11,9 +11,11 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from surveillance_runtime.alarms import SILENT_AFTER
+from surveillance_runtime.graph_check import PATIENCE, InputWatch
 from surveillance_runtime.incidents import Incidents
 from surveillance_runtime.node import PatrolNode
-from surveillance_runtime.profile.record import Frames
+from surveillance_runtime.profile.check_up import awaited
+from surveillance_runtime.profile.record import Frames, RobotProfile
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing.sensors import REPEATED, OdometryReader
 from surveillance_runtime.sensing.silence import SensorWatch, SilenceWatch
@@ -29,7 +31,7 @@ def test_a_silent_topic_is_named_once_until_it_speaks() -> None:
     scan, odom = stream('/scan'), stream('/odom')
     silence = SilenceWatch(Incidents(lambda told: lines.append(told.words())), (scan, odom))
     # What never came is told elsewhere, once.
-    silence.look(1000.0)
+    silence.look(-1.0)
     assert not lines
     scan.came_at = scan.heard_at = 0.0
     for second in range(30):
@@ -43,6 +45,8 @@ def test_a_silent_topic_is_named_once_until_it_speaks() -> None:
     assert lines[1:] == ['incident [topic /scan, over]: /scan is published again']
     silence.look(31.0 + SILENT_AFTER - 1.0)
     silence.look(1000.0)
+    assert not lines[2:], 'nobody spun the node meanwhile'
+    silence.look(1001.0)
     assert {line.split(',')[0] for line in lines[2:]} == {
         'incident [topic /odom',
         'incident [topic /scan',
@@ -54,8 +58,8 @@ def test_what_comes_and_is_of_no_use_is_not_called_silence() -> None:
     scan = stream('/scan')
     silence = SilenceWatch(Incidents(lambda told: lines.append(told.words())), (scan,))
     scan.heard_at, scan.came_at, scan.problem = 0.0, 9.9, 'the lidar is covered'
-    silence.look(10.0)
-    silence.look(30.0)
+    for now in (8.0, 10.0, 29.0, 30.0):
+        silence.look(now)
     assert [line.partition(']: ')[2] for line in lines] == [
         'nothing of use comes on /scan (the lidar is covered): the robot cannot drive',
         'nothing is published on /scan: the robot cannot drive',
@@ -82,7 +86,7 @@ def test_a_lidar_that_is_of_no_use_from_the_beginning_is_told_with_the_reason(
 
     def told() -> bool:
         scans.publish(message)
-        watch._inputs._since['/scan'] -= 4.0
+        watch._inputs._silent['/scan'] += 4.0
         lidar.streams['scan'].heard_at = None
         return any('/scan: what comes is of no use: ' in line for line in said)
 
@@ -91,6 +95,24 @@ def test_a_lidar_that_is_of_no_use_from_the_beginning_is_told_with_the_reason(
     assert any(reason in line for line in said)
     assert len(seen) == (0 if fault == 'covered' else 1)
     assert not any('nothing came for' in line for line in said)
+
+
+def test_time_in_which_nobody_spun_the_node_is_no_silence(graph: Any) -> None:
+    node = graph.add(PatrolNode, name='driving')
+    odom = next(each for each in awaited(RobotProfile()) if each.topic == '/odom')
+    clock = [0.0]
+    watch = InputWatch(node, [odom], lambda: ['/odom'], now=lambda: clock[0])
+
+    def told_at(now: float) -> bool:
+        clock[0] = now
+        watch._look()
+        return bool(node.incidents.open())
+
+    # The executor begins late, and later stands still for a minute: both times it looks before it
+    # takes what waits.
+    assert not told_at(4.6)
+    assert not told_at(66.6)
+    assert told_at(66.6 + PATIENCE)
 
 
 def test_odometry_that_is_no_number_is_told_as_such(graph: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -18,6 +19,8 @@ from surveillance_runtime.profile.truth_check import doubts
 from surveillance_runtime.sensing import conversions
 from surveillance_runtime.sensing.sensors import SensorStream
 
+LOOK_PERIOD = 1.0
+"""Seconds of real time between two looks at what fell silent."""
 DOUBT_PERIOD = 5.0
 """Seconds of real time between two looks whether what comes can be true."""
 
@@ -25,7 +28,8 @@ DOUBT_PERIOD = 5.0
 class SilenceWatch:
     """Begins an incident for a topic that tells nothing any more, and ends it when it does.
 
-    What never came is not told here.
+    What never came is not told here; nor is a silence in which nobody spun the node: what came
+    meanwhile still waits to be taken.
 
     Args:
         incidents: Where it is told.
@@ -35,9 +39,14 @@ class SilenceWatch:
     def __init__(self, incidents: Incidents, streams: Iterable[SensorStream]) -> None:
         self._incidents = incidents
         self._streams = tuple(streams)
+        self._looked_at = -math.inf
 
     def look(self, now: float) -> None:
-        """Look which topics tell nothing, at a steady time, seconds."""
+        """Look which topics tell nothing, at a steady time, seconds; about each `LOOK_PERIOD`."""
+        stood_still = now - self._looked_at >= SILENT_AFTER / 2
+        self._looked_at = now
+        if stood_still:
+            return
         for stream in self._streams:
             cause = 'topic', stream.topic
             if stream.heard_at is None or stream.came_at is None:
@@ -97,7 +106,7 @@ class SensorWatch:
         self._node, self._profile = node, replace(RobotProfile(), topics=topics, frames=frames)
         self._streams, self._child = streams, child
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(1.0, lambda: self._silence.look(time.monotonic()), clock=steady)
+        node.create_timer(LOOK_PERIOD, lambda: self._silence.look(time.monotonic()), clock=steady)
         node.create_timer(DOUBT_PERIOD, self._doubt, clock=steady)
 
     def _doubt(self) -> None:
