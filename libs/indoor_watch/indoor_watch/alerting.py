@@ -13,7 +13,7 @@ from datetime import datetime
 from typing import Any, Protocol
 
 from indoor_watch.events import Event, EventBook, EventState
-from indoor_watch.evidence import EvidenceStore, side_by_side
+from indoor_watch.evidence import BLURRED, SWEEP, EvidenceStore, side_by_side
 from indoor_watch.habits import Habits
 from indoor_watch.observations import Observation
 from indoor_watch.persons import Picture
@@ -24,6 +24,8 @@ SENT_WITHIN = 60.0
 """Whoever was told of a picture that is replaced has sent it by then, seconds."""
 Drawn = Callable[[tuple[float, float], Visit], tuple[Picture, Picture | None] | None]
 """Draws what a lidar met around a point of the map, and what stands there normally."""
+Blur = Callable[[Picture], tuple[Picture, bool]]
+"""Blurs people in a picture, and tells whether nobody in it can be recognised any more."""
 
 
 class Alerting:
@@ -39,8 +41,8 @@ class Alerting:
         warn: Called with each of them that nobody could look at again, where its rule wants that.
         store: Keeps pictures; None: nothing is kept.
         drawn: Draws what has no picture.
-        blur: Returns a picture in which people are blurred, for rules that do not want them sharp;
-            None: all are kept as they are.
+        blur: Blurs people in pictures, for rules that do not want them sharp; None: all are kept
+            as they are.
         verify_seconds: An alert that is not sure waits so long for a second look.
     """
 
@@ -57,7 +59,7 @@ class Alerting:
         store: EvidenceStore | None,
         drawn: Drawn,
         verify_seconds: float,
-        blur: Callable[[Picture], Picture] | None = None,
+        blur: Blur | None = None,
     ) -> None:
         self.rules, self.book = tuple(rules), book
         self._local, self._robot, self._tell = local, robot, tell
@@ -116,12 +118,15 @@ class Alerting:
         if picture is None and seen.position is not None:
             drawn = self._drawn(seen.position, visit)
             if drawn is not None:
-                (picture, before), kind = drawn, 'sweep-'
+                (picture, before), kind = drawn, SWEEP
         if picture is None:
             return ''
         if self._blur is not None and not is_sharp and not kind:
-            picture = self._blur(picture)
-            before = None if before is None else self._blur(before)
+            picture, is_complete = self._blur(picture)
+            if before is not None:
+                before, is_also = self._blur(before)
+                is_complete = is_complete and is_also
+            kind = BLURRED if is_complete else ''
         if before is not None:
             picture = side_by_side(before, picture)
         what = f'{kind}{seen.kind}-{seen.subject or seen.place}-{seen.state}'

@@ -14,7 +14,7 @@ from datetime import datetime
 from typing import Any
 
 from floor_plans import Grid
-from indoor_watch.alerting import Alerting, restoring_all
+from indoor_watch.alerting import Alerting, Blur, restoring_all
 from indoor_watch.door_monitor import DoorMonitor
 from indoor_watch.doors import Segment
 from indoor_watch.events import ELSEWHERE, Event, EventBook, EventState
@@ -91,7 +91,7 @@ class ChangeMonitor:
         views: ReferenceViews | None = None,
         verify_seconds: float = 0.0,
         others: OtherRobots | None = None,
-        blur: Callable[[Picture], Picture] | None = None,
+        blur: Blur | None = None,
     ) -> None:
         self._others = others or OtherRobots(0.0)
         self._covered = covered

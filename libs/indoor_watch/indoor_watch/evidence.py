@@ -29,10 +29,15 @@ _NAME = re.compile(r'(\d)_(\d{13})_.*')
 DAY = 86400.0
 
 
-def is_sweep(name: str) -> bool:
-    """Tell whether a file shows a map with a sweep of the lidar, and no camera's picture."""
+SWEEP, BLURRED = 'sweep-', 'blurred-'
+"""So begins what a picture is of: a map with a sweep of the lidar; a camera's picture in which
+persons and faces were looked for, and are blurred."""
+
+
+def shows_nobody(name: str) -> bool:
+    """Tell whether nobody can be recognised in a file: in a sweep, or where all are blurred."""
     match = _NAME.fullmatch(name)
-    return match is not None and name[len('0_0000000000000_') :].startswith('sweep-')
+    return match is not None and name[len('0_0000000000000_') :].startswith((SWEEP, BLURRED))
 
 
 class EvidenceStore:

@@ -2,7 +2,8 @@
 
 Persons are looked for with the network of `persons`, faces with the cascade of scikit-image (local
 binary patterns). Where that network is not installed, nobody can say where persons are: then the
-whole picture is sent coarse. Maps with a sweep of the lidar show nobody and are sent as they are.
+whole picture is sent coarse. Maps with a sweep of the lidar show nobody and are sent as they are,
+and so is a picture that was blurred when it was kept.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from indoor_watch.evidence import is_sweep
+from indoor_watch.evidence import shows_nobody
 from indoor_watch.persons import load_finder
 
 Picture = NDArray[np.uint8]
@@ -58,7 +59,7 @@ def shareable(path: Path, *, blur: bool = True, find: Find | None = None) -> byt
     if picture is None:
         raise PictureError(f'{path.name}: no picture')
     shown = np.asarray(picture, np.uint8)
-    if blur and not is_sweep(path.name):
+    if blur and not shows_nobody(path.name):
         shown = blurred(shown, find or installed_finder())
     if shown.shape[1] > WIDEST:
         size = WIDEST, round(shown.shape[0] * WIDEST / shown.shape[1])
@@ -83,8 +84,10 @@ def blurred(picture: Picture, find: Find | None) -> Picture:
     return result
 
 
-def blurred_at_rest(picture: Picture) -> Picture:
+def blurred_at_rest(picture: Picture) -> tuple[Picture, bool]:
     """Return a picture as it is kept: people blurred, as far as they are found, and faces.
+
+    And whether persons were looked for: then it may leave the machine as it is.
 
     Args:
         picture: Grey or BGR.
@@ -92,8 +95,9 @@ def blurred_at_rest(picture: Picture) -> Picture:
     colour = picture
     if picture.ndim == 2:
         colour = np.asarray(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR), np.uint8)
+    finder = installed_finder()
     # It stays on the machine: where no network finds persons, their faces alone are blurred.
-    return blurred(colour, installed_finder() or (lambda _: []))
+    return blurred(colour, finder or (lambda _: [])), finder is not None
 
 
 def faces_in(picture: Picture) -> list[Box]:

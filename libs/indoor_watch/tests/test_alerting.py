@@ -12,6 +12,7 @@ import pytest
 
 from indoor_watch import Event, EventBook, EvidenceStore, Kind, Observation, rule_from
 from indoor_watch.alerting import SENT_WITHIN, Alerting
+from indoor_watch.evidence import shows_nobody
 from indoor_watch.visit import LidarSweep, Pictured, Visit
 
 BARE = np.full((40, 60), 90, np.uint8)
@@ -164,15 +165,18 @@ def test_a_door_that_nobody_could_look_at_again_is_told_all_the_same(tmp_path: P
     assert (len(alerted.calls), len(alerted.warned)) == (1, 0)
 
 
-@pytest.mark.parametrize(('rule', 'blurs'), [({}, 1), ({'pictures': 'sharp'}, 0)])
+@pytest.mark.parametrize(
+    ('rule', 'is_complete', 'blurs'),
+    [({}, True, 1), ({}, False, 1), ({'pictures': 'sharp'}, True, 0)],
+)
 def test_people_in_kept_pictures_are_blurred_unless_the_rule_wants_them_sharp(
-    tmp_path: Path, rule: dict[str, str], blurs: int
+    tmp_path: Path, rule: dict[str, str], is_complete: bool, blurs: int
 ) -> None:
     asked = []
 
-    def blur(picture: np.ndarray) -> np.ndarray:
+    def blur(picture: np.ndarray) -> tuple[np.ndarray, bool]:
         asked.append(picture.shape)
-        return np.zeros_like(picture)
+        return np.zeros_like(picture), is_complete
 
     alerting = Alerting(
         [rule_from({'person': 'nobody', **rule})],
@@ -191,3 +195,5 @@ def test_people_in_kept_pictures_are_blurred_unless_the_rule_wants_them_sharp(
     assert len(asked) == blurs
     (kept,) = tmp_path.iterdir()
     assert (cv2.imread(str(kept)).mean() < 50) == bool(blurs)
+    # A sink blurs whatever was kept sharp, or without a look for persons.
+    assert shows_nobody(kept.name) == bool(blurs and is_complete)

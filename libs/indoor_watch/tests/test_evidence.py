@@ -11,7 +11,7 @@ import pytest
 
 from floor_plans import Grid
 from indoor_watch import EvidenceStore
-from indoor_watch.evidence import DAY, is_sweep, oldest, side_by_side, sweep_picture
+from indoor_watch.evidence import DAY, oldest, shows_nobody, side_by_side, sweep_picture
 
 PLAIN = np.full((40, 60), 90, np.uint8)
 NOW = 1_700_000_000.25
@@ -48,13 +48,14 @@ def test_a_name_says_severity_time_and_what(
     ('name', 'told'),
     [
         ('2_1700000000250_sweep-box.jpg', True),
+        ('2_1700000000250_blurred-box.jpg', True),
         ('2_1700000000250_box-sweep-.jpg', False),
         ('2_1700000000250_sweep.jpg', False),
         ('sweep-box.jpg', False),
     ],
 )
 def test_a_sweep_is_told_by_its_name(name: str, told: bool):
-    assert is_sweep(name) is told
+    assert shows_nobody(name) is told
 
 
 def test_the_least_severe_goes_first_and_of_those_the_oldest(tmp_path: Path):

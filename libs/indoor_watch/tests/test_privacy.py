@@ -10,7 +10,7 @@ import pytest
 from skimage import data
 
 from indoor_watch import EvidenceStore
-from indoor_watch.evidence import DAY, is_sweep
+from indoor_watch.evidence import DAY, shows_nobody
 from indoor_watch.privacy import PictureError, blurred, shareable
 
 
@@ -45,11 +45,12 @@ def test_where_nobody_can_look_for_persons_the_whole_picture_is_coarse() -> None
     assert shown.mean() == pytest.approx(picture.mean(), abs=3.0)
 
 
-def test_a_sweep_is_sent_as_it_is_and_what_is_no_picture_is_refused(tmp_path: Path) -> None:
+def test_what_shows_nobody_is_sent_as_it_is_and_no_picture_is_refused(tmp_path: Path) -> None:
     store = EvidenceStore(tmp_path)
     camera = store.keep(astronaut(), 'person-R1-seen', 3, 1000.0)
     sweep = store.keep(astronaut(), 'sweep-door-D1-ajar', 3, 1000.0)
-    assert (is_sweep(camera), is_sweep(sweep)) == (False, True)
+    done = store.keep(astronaut(), 'blurred-person-R1-seen', 3, 1000.0)
+    assert [shows_nobody(each) for each in (camera, sweep, done)] == [False, True, True]
 
     def sent(name: str, *, blur: bool = True) -> np.ndarray:
         jpeg = np.frombuffer(shareable(tmp_path / name, blur=blur, find=lambda _: []), np.uint8)
@@ -57,6 +58,7 @@ def test_a_sweep_is_sent_as_it_is_and_what_is_no_picture_is_refused(tmp_path: Pa
 
     face = np.s_[75:150, 180:260]
     assert detail(sent(sweep)[face]) > 3 * detail(sent(camera)[face])
+    assert detail(sent(done)[face]) > 3 * detail(sent(camera)[face]), 'it is not blurred twice'
     assert detail(sent(camera, blur=False)[face]) > 3 * detail(sent(camera)[face])
     (tmp_path / 'x.jpg').write_bytes(b'nothing')
     for name in ('x.jpg', 'gone.jpg'):
@@ -80,6 +82,6 @@ def test_two_things_that_are_noticed_at_once_have_a_picture_each(tmp_path):
         for shade in (0, 128, 255)
     ]
     assert len(set(names)) == 3
-    assert all(is_sweep(name) for name in names)
+    assert all(shows_nobody(name) for name in names)
     shades = [float(np.mean(np.asarray(cv2.imread(str(tmp_path / name))))) for name in names]
     assert np.allclose(shades, [0, 128, 255], atol=4)
