@@ -39,8 +39,7 @@ OBSERVER = 'observer'
 _REMAP = re.compile(r'[~/\w]+:=[~/\w]+\Z', re.ASCII)
 _NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/[A-Za-z]\w*)*\Z', re.ASCII)
 _DESCRIPTION = """\
-Runs a patrol until Ctrl-C, each node in its own process, or runs COMMAND. The first start sets up
-.venv."""
+Runs a patrol until Ctrl-C, or runs COMMAND. The first start sets up .venv."""
 _COMMANDS = """\
 commands (each has its own --help):
   run                       run a patrol: the same as without a command
