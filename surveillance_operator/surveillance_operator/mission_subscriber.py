@@ -173,7 +173,9 @@ class MissionSubscriber:
             # Nothing passes after a mission's end.
             now = old.now if self._over else self._clock.now()
             new, told = follow(old, replace(new, now=now), time.time())
-            self._over = self._over or bool(old.health.nodes and not new.health.nodes)
+            if not self._over and old.health.nodes and not new.health.nodes:
+                self._over = True
+                self._reader.forget()
             self._state = new
         self._on_change(new, told)
 
@@ -201,6 +203,7 @@ class MissionSubscriber:
     def _begin_anew(self) -> MissionState:
         """Return what is still known when another mission begins."""
         self._over = False
+        self._reader.forget()
         self._questions.forget()
         self._clock.forget()
         return self._empty.having(**{name: self._state.field(name) for name in KEPT})

@@ -7,6 +7,9 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.serialization import deserialize_message
+
 from surveillance_operator.polled_subscription import PolledSubscription, await_message
 from surveillance_operator.topics import TOPICS, Topic
 from surveillance_runtime.conversions import clean_texts
@@ -24,6 +27,8 @@ OF_THE_PLACE = ('map', 'door_states')
 class TopicReader:
     """The topics of one robot's mission; always from the same thread.
 
+    A latched state is repeated each second: it is compared by its bytes, and read when it changed.
+
     Args:
         node: The node that listens.
         robot: The robot of a fleet; empty: that of the node's own namespace.
@@ -37,7 +42,12 @@ class TopicReader:
     def __init__(self, node: PatrolNode, robot: str = '', *, streams: bool = False) -> None:
         self._context = node.context
         self._topics = [
-            (topic, PolledSubscription(node, topic.kind, name_for(robot, topic.name), topic.qos))
+            (
+                topic,
+                PolledSubscription(
+                    node, topic.kind, name_for(robot, topic.name), topic.qos, raw=topic.is_state
+                ),
+            )
             for topic in TOPICS
             if (streams or not topic.stream)
             and not (robot and (topic.name in OF_THE_PLACE or topic.whose is not None))
@@ -48,6 +58,7 @@ class TopicReader:
             for topic, subscription in self._topics
             if streams and not topic.beside and not topic.period
         ]
+        self._states: dict[str, bytes] = {}
         self._next_reading: dict[str, float] = {}
         self._passed_on: deque[tuple[Topic, Any]] = deque(maxlen=MOST_PASSED_ON)
         self.robots: Mapping[str, TopicReader] = {}
@@ -68,11 +79,14 @@ class TopicReader:
             for _ in range(subscription.qos.depth):
                 if (taken := subscription.take()) is None:
                     break
-                clean_texts(taken[0])
+                message = self._changed(topic, taken[0]) if topic.is_state else taken[0]
+                if message is None:
+                    continue
+                clean_texts(message)
                 if topic.whose is not None:
-                    self._pass_on(topic, topic.whose(taken[0]), taken[0])
+                    self._pass_on(topic, topic.whose(message), message)
                 # In front: what it stands beside is read with it.
-                came.insert(0 if topic.beside else len(came), (topic, taken[0]))
+                came.insert(0 if topic.beside else len(came), (topic, message))
         return came
 
     def wait(self) -> None:
@@ -80,10 +94,24 @@ class TopicReader:
         if self._prompt:
             await_message(self._context, self._prompt, WAKE_PERIOD)
 
+    def forget(self) -> None:
+        """Read each state once more when it is repeated; from any thread."""
+        self._states.clear()
+
     def destroy(self) -> None:
         """Leave all topics."""
         for _, subscription in self._topics:
             subscription.destroy()
+
+    def _changed(self, topic: Topic, state: bytes) -> Any | None:
+        """Return the message of a state; None where it was read before, or is none."""
+        if state == self._states.get(topic.name):
+            return None
+        self._states[topic.name] = state
+        try:
+            return deserialize_message(state, topic.kind)
+        except _rclpy.RMWError:  # the bytes of a stranger may be anything
+            return None
 
     def _pass_on(self, topic: Topic, whose: Iterable[str] | None, message: Any) -> None:
         readers = self.robots

@@ -133,6 +133,11 @@ class Topic(NamedTuple):
         """
         return not self.name.startswith('/') and self.name != INCIDENTS_TOPIC
 
+    @property
+    def is_state(self) -> bool:
+        """Whether a message that repeats the one before tells nothing."""
+        return self.qos is STATE_QOS
+
 
 def read_message(state: MissionState, topic: Topic, message: Any) -> MissionState:
     """Return the state with what a message says, or why it cannot be used."""
