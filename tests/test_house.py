@@ -28,7 +28,6 @@ DOUBLE_NAMES: dict[str, str] = {
 }
 """Class names that several modules use, each with its reason to stay; empty: to be renamed."""
 LARGE_CLASSES = {
-    'WorldFile': 'one record of what the file lacks, which changes only as a whole',
     'WorldOntology': 'axioms as quads, both ways, by one table of what is known of them',
     'CaseModel': 'the model of a tableau: its facts and what each hangs on',
     'CaseSearch': 'the search of a tableau',

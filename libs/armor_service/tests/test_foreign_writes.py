@@ -18,7 +18,7 @@ import pytest
 from armor_service.access import Settings
 from armor_service.client import ArmorClient, InProcessTransport
 from armor_service.service import ArmorService
-from armor_service.store import world_file
+from armor_service.store import write_failure
 from armor_service.store.store import Store
 from owl_reasoner.notifier import Changes
 
@@ -316,7 +316,7 @@ print('saved', flush=True)
 def test_who_keeps_the_file_for_long_is_named(
     served: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(world_file, 'TOLD_AFTER', 0.2)
+    monkeypatch.setattr(write_failure, 'TOLD_AFTER', 0.2)
     late = served.program("print('open', flush=True)\nsys.stdin.readline()\n")
     assert late.stdout is not None
     assert late.stdin is not None

@@ -191,7 +191,7 @@ def test_a_full_disk_takes_no_knowledge_and_is_caught_up_with(
 
 
 def test_a_file_that_may_not_grow_gives_its_changes_to_the_spill(server: Server) -> None:
-    db = server.store._files['map']._db
+    db = server.store._files['map'].connection.db
     assert db is not None
     (pages,) = db.execute('PRAGMA page_count').fetchone()
     db.execute(f'PRAGMA max_page_count = {pages}')
@@ -381,7 +381,7 @@ def test_a_folder_that_may_not_be_written_is_told_and_keeps_nobody_from_working(
         patched.setattr(WorldFile, '_opened', refuse)
         patched.setattr(Spill, 'append', refuse)
         patched.setattr(Spill, 'clear', refuse)
-        patched.setattr('armor_service.store.world_file.os.access', lambda *_: False)
+        patched.setattr('os.access', lambda *_: False)
         request = DirectiveRequest('c', 'map', 'LOAD', 'FILE', '', LOAD_ALL)
         assert server.service.execute(request).success
         server.ask('ADD IND CLASS', 'D9', 'DOOR')

@@ -9,7 +9,7 @@ from pathlib import Path
 import owlready2
 import pytest
 
-from armor_service.store.world_file import WorldFile
+from armor_service.store.world_connection import WorldConnection
 from armor_service.store.world_ontology import WorldNames, WorldOntology
 from owl_reasoner.documents.reading import read_ontology
 from owl_reasoner.owl.axioms import (
@@ -39,19 +39,20 @@ class File:
     """A World's file with one ontology, which can be opened again."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = WorldFile(folder / 'o.sqlite3', print)
+        self._file = WorldConnection(folder / 'o.sqlite3')
+        self._file.make()
         self.open()
         with self.db:
             self.db.execute('BEGIN')
             self.ontology.write_header()
 
     def open(self) -> None:
-        self.db = self._file._opened()
+        self.db = self._file.open()
         self.ontology = WorldOntology(self.db, IRI, WorldNames(self.db))
         self.known = [a for a in self.ontology.read().added if not isinstance(a, Declaration)]
 
     def reopen(self) -> list[Axiom]:
-        self._file.close_file()
+        self._file.close()
         self.open()
         return self.known
 
@@ -166,7 +167,7 @@ def test_owlready2_reads_an_odd_number_as_a_number(tmp_path: Path, file: File) -
         file.change(
             [DataPropertyAssertion(f'{IRI}#d', f'{IRI}#{name}', Literal(text, XSD + 'long'))]
         )
-    file._file.close_file()
+    file._file.close()
     world = owlready2.World(filename=str(tmp_path / 'o.sqlite3'))
     assert (world[f'{IRI}#a'].d, world[f'{IRI}#b'].d) == ([7], [5])
     world.close()

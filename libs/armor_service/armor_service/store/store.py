@@ -192,7 +192,7 @@ class Store:
     def sync(self, name: str) -> None:
         """Wait until what was committed is certain; without the reference's lock."""
         if self._synced and (file := self._files.get(name)) is not None:
-            file.sync()
+            file.connection.sync()
 
     def backup(self, name: str, target: Path) -> str:
         """Write a copy of a reference's file, as of now.
@@ -242,7 +242,7 @@ class Store:
                     finally:
                         file.ref.lock.release()
                 if looks % LOG_PERIOD == 0:
-                    file.write_log_back()
+                    file.connection.write_log_back()
 
 
 def file_stem(name: str) -> str:
