@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from typing import Any, TypeAlias
 
 from armor_service.store.unique_names import ListWords, different_lists
@@ -308,10 +309,7 @@ class WorldOntology:
         if kind is ax.DataPropertyAssertion:
             literal = axiom.literal  # type: ignore[attr-defined]
             subject, prop = axiom.subject, axiom.prop  # type: ignore[attr-defined]
-            datatype: int | str = f'@{literal.language}'
-            if not literal.language:
-                datatype = self._number(literal.datatype)
-            return self._node(subject), self._number(prop), stored_value(literal), datatype
+            return self._node(subject), self._number(prop), *self._value(literal)
         if kind is ax.ObjectPropertyAssertion:
             subject, prop = axiom.subject, axiom.prop  # type: ignore[attr-defined]
             other = axiom.object  # type: ignore[attr-defined]
@@ -334,12 +332,10 @@ class WorldOntology:
             triples = self._annotating(axiom, triples, made)
         for subject, predicate, value in triples:
             s, p = self._node(subject, made), self._number(predicate)
-            if isinstance(value, Literal):
-                quads.append((s, p, stored_value(value), self._datatype(value)))
-            elif (predicate, value) == (_TYPE, SWRL + 'Variable'):
-                self._insert((s, p, self._number(value)))  # Rules share their variables.
+            if (predicate, value) == (_TYPE, SWRL + 'Variable'):
+                self._insert((s, p, *self._value(value)))  # Rules share their variables.
             else:
-                quads.append((s, p, self._node(value, made)))
+                quads.append((s, p, *self._value(value, made)))
         for quad in quads:
             self._insert(quad)
         taken = {}
@@ -423,9 +419,6 @@ class WorldOntology:
     def _number(self, name: str) -> int:
         return self._names.number(name)
 
-    def _datatype(self, literal: Literal) -> int | str:
-        return f'@{literal.language}' if literal.language else self._number(literal.datatype)
-
     def _insert(self, quad: Quad) -> None:
         self._db.execute(self._statements[len(quad)][0], quad)
 
@@ -453,13 +446,9 @@ class WorldOntology:
             f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} AND p NOT IN (?, ?) '
             f'AND NOT (p=? AND s>0 AND o IN ({kinds})) ORDER BY rowid'
         )
-        for quad in execute(query, (*words[-2:], words.type)):
-            axiom = self._fact(quad)
-            if axiom is None:
-                rest.append(quad)
-            else:
-                found.added.append(axiom)
-        for quad in execute(f'SELECT s, p, o, d FROM datas NOT INDEXED WHERE c={c} ORDER BY rowid'):
+        objs = execute(query, (*words[-2:], words.type))
+        datas = execute(f'SELECT s, p, o, d FROM datas NOT INDEXED WHERE c={c} ORDER BY rowid')
+        for quad in chain(objs, datas):
             axiom = self._fact(quad)
             if axiom is None:
                 rest.append(quad)
@@ -618,14 +607,15 @@ class WorldOntology:
 
     def _quad(self, subject: str, predicate: str, value: Node, numbers: Mapping[str, int]) -> Quad:
         s = numbers[subject] if subject in numbers else self._number(subject)
-        if isinstance(value, Literal):
-            return s, self._number(predicate), *self._value(value)
-        return s, self._number(predicate), numbers[value] if value in numbers else self._node(value)
+        if isinstance(value, str) and value in numbers:
+            return s, self._number(predicate), numbers[value]
+        return s, self._number(predicate), *self._value(value)
 
-    def _value(self, value: Node) -> Quad:
-        if isinstance(value, Literal):
-            return stored_value(value), self._datatype(value)
-        return (self._node(value),)
+    def _value(self, value: Node, made: dict[str, int] | None = None) -> Quad:
+        if not isinstance(value, Literal):
+            return (self._node(value, made),)
+        language = value.language
+        return stored_value(value), f'@{language}' if language else self._number(value.datatype)
 
     # --- what others changed ---
 
@@ -750,13 +740,10 @@ class WorldOntology:
 
     def text(self, quad: Quad) -> Iterator[str]:
         """Yield subject, predicate and value of a quad as N-Triples has them."""
-        for number in quad[:2]:
+        for number in quad[: 3 if len(quad) == 3 else 2]:
             name = self._name(number)
             yield name if name[:2] == '_:' else f'<{name}>'
-        if len(quad) == 3:
-            name = self._name(quad[2])
-            yield name if name[:2] == '_:' else f'<{name}>'
-        else:
+        if len(quad) == 4:
             literal = self._literal(*quad[2:])
             text = literal.lexical.replace('\\', '\\\\').replace('"', '\\"').replace('\n', '\\n')
             yield (
