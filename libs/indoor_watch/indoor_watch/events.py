@@ -202,6 +202,8 @@ class EventBook:
         Returns:
             The event; None where it is normal, or of no severity and of no event.
         """
+        if severity > 0:
+            self._turn(seen)
         self._end_others(seen)
         if any(_same(each, seen) for each in self._normal.get(_key(seen), ())):
             return None
@@ -434,6 +436,16 @@ class EventBook:
         # What a person called false is not told again while it is seen.
         found = [each for each in self._near(seen) if _agrees(each, seen)]
         return max(found, key=lambda each: each.last, default=None)
+
+    def _turn(self, seen: Observation) -> None:
+        """Have an open event of a thing with a name go on in another state that breaks a rule, too.
+
+        A door that was ajar and is closed now, where it is to be open, calls nobody again.
+        """
+        for each in self._near(seen):
+            is_open = each.subject and each.state == EventState.OPEN
+            if is_open and _ends(each, seen) and seen.stamp > each.last:
+                self._keep(replace(each, seen=seen.state), seen)
 
     def _end_others(self, seen: Observation) -> None:
         """End events of the same thing in another state: a door that is open is closed no more."""

@@ -52,6 +52,20 @@ def test_what_no_rule_cares_for_begins_nothing_and_ends_what_it_contradicts():
     assert book.events[0].last == 200.0
 
 
+def test_a_door_that_breaks_its_rule_in_another_way_is_one_event_until_it_is_acknowledged():
+    book = EventBook()
+    door = {'kind': Kind.DOOR, 'subject': 'D3', 'position': None}
+    take(book, seen(state='ajar', **door))
+    event = take(book, seen(state='closed', stamp=173.0, **door))
+    assert [each.state for each in book.events] == [EventState.OPEN]
+    assert (event.number, event.seen, event.began, event.sightings) == (1, 'closed', 100.0, 2)
+    book.answer(1, EventState.ACKNOWLEDGED)
+    take(book, seen(state='ajar', stamp=400.0, **door))
+    assert [book.find(each).state for each in (1, 2)] == [EventState.OVER, EventState.OPEN]
+    take(book, seen(state='open', stamp=500.0, **door), severity=0)
+    assert {each.state for each in book.events} == {EventState.OVER}
+
+
 def test_a_thing_that_was_moved_there_is_the_one_that_appeared_there():
     book = EventBook()
     take(book, seen())
