@@ -89,11 +89,7 @@ def read_door(door: Segment, sensor: tuple[float, float], ends: Points) -> DoorR
         return None
     # Also beams beside the opening may meet an open leaf: all that come as near as it reaches.
     near = seen | (_passes(origin, rays, ranges, first, width) & (ranges > 0.3))
-    reached = np.zeros_like(through)
-    if min(np.linalg.norm(origin - first), np.linalg.norm(origin - second)) < width:
-        # In the doorway the leaf is met by beams, too, that do not cross the opening.
-        reached = ~through & _reached(origin + rays * ranges[:, None], first, second)
-    measured = Beams(rays[near], ranges[near], to_line[near], seen[near], reached[near], width)
+    measured = Beams(rays[near], ranges[near], to_line[near], seen[near], width)
     fits: dict[DoorState, list[tuple[float, float]]] = {state: [] for state in DoorState}
     for hinge, other in ((first, second), (second, first)):
         for side in (1.0, -1.0):
@@ -148,15 +144,6 @@ def _passes(
     return np.asarray(np.linalg.norm(nearest - centre, axis=1) < radius)
 
 
-def _reached(points: Points, first: Points, second: Points) -> NDArray[np.bool_]:
-    """Tell which points a leaf may reach, off the line of the shut door and of its wall."""
-    line, offsets = second - first, points - first
-    width = float(np.linalg.norm(line))
-    away = np.abs(offsets[:, 0] * line[1] - offsets[:, 1] * line[0]) / max(width, 1e-9)
-    hinge = np.minimum(np.linalg.norm(offsets, axis=1), np.linalg.norm(points - second, axis=1))
-    return np.asarray((away > 4 * DEVIATION) & (hinge < width))
-
-
 @dataclass(frozen=True)
 class Beams:
     """What was measured near a door.
@@ -166,8 +153,6 @@ class Beams:
         ranges: What was measured, (n,), metres.
         to_line: How far the opening's line is along each beam, (n,), metres.
         through: Whether a beam goes through the opening, (n,).
-        reached: Whether a beam of a lidar in the doorway does not go through the opening, and ends
-            where a leaf may stand, (n,).
         width: Of the leaf, metres.
     """
 
@@ -175,7 +160,6 @@ class Beams:
     ranges: Points
     to_line: Points
     through: NDArray[np.bool_]
-    reached: NDArray[np.bool_]
     width: float
 
     @cached_property
@@ -184,8 +168,7 @@ class Beams:
         beyond = self.ranges - np.where(np.isfinite(self.to_line), self.to_line, 0.0)
         # What stands just behind the opening may be a leaf, or a shelf: a leaf that fits wins.
         passed = np.where(beyond > self.width, 1.0, CLOSE_BEHIND)
-        beside = np.where(self.reached, CLOSE_BEHIND, 1.0)
-        free = np.where(self.through, np.where(beyond > 2 * DEVIATION, passed, 0.0), beside)
+        free = np.where(self.through, np.where(beyond > 2 * DEVIATION, passed, 0.0), 1.0)
         return np.asarray(np.log(FLOOR + (1.0 - FLOOR) * free))
 
     def fits(self, hinge: Points, leaves: Points) -> Points:
