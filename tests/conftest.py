@@ -8,6 +8,7 @@ import copy
 import gc
 import os
 import shutil
+import sys
 import tempfile
 import threading
 import time
@@ -20,6 +21,7 @@ from typing import Any, TypeVar
 import hypothesis
 import pytest
 
+from launcher.environment import keep_bytecode
 from surveillance_runtime import incidents
 from surveillance_runtime.discovery import launched_nodes
 from surveillance_runtime.testing import claim_domain
@@ -38,6 +40,10 @@ hypothesis.settings.load_profile('suite')
 
 # What the imports leave is no garbage: looking for it costs a fourth of their time.
 gc.disable()
+# As `launch.py test` has it: otherwise each process of a run compiles all that it imports.
+keep_bytecode(os.environ)
+sys.dont_write_bytecode = bool(os.environ.get('PYTHONDONTWRITEBYTECODE'))
+sys.pycache_prefix = os.environ.get('PYTHONPYCACHEPREFIX')
 _domain = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
 # What a robot keeps for its next start is a test's own.

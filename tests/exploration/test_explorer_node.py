@@ -73,11 +73,13 @@ def test_what_cannot_be_written_at_the_end_is_one_line(graph, tmp_path: Path) ->
     node = graph.add(Explorer, {'folder': str(tmp_path), 'frontiers.least': 0.9})
     robot = Robot(graph, door=0.5)
 
-    def ended() -> bool:
+    def sees() -> bool:
         robot.tell()
-        return bool(node.finished)
+        return node.exploration.grid is not None
 
-    graph.until(ended)
+    graph.until(sees)
+    node.exploration.stop()  # as if all was seen
+    graph.until(lambda: node.finished)
     graph.until(lambda: any(line.startswith('what is left is not kept: ') for line in said))
     assert read_map(tmp_path / MAP_FILE)
 

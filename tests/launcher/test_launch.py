@@ -109,18 +109,6 @@ def test_a_mission_that_did_not_begin_in_its_time_is_a_failure(launch):
     assert sum('| started' in line for line in mission.lines) == 1
 
 
-def test_all_nodes_in_one_process(launch, clock):
-    mission = launch('--mode', 'RANDOM', '--composed')
-    process = process_of(mission, 'robot_behavior')
-    mission.until(r'robot_behavior +\| arrived in')
-    # The recorder and the alarm look on from a process of their own.
-    assert len(set(re.findall(r'\(process (\d+)\)', '\n'.join(mission.lines)))) == 2
-    code, seconds = mission.end(signal.SIGTERM)
-    assert code == 0
-    assert seconds < 60
-    assert gone([process], 0)
-
-
 def test_one_console_serves_the_three_controllers(launch, clock):
     mission = launch('--mode', 'MANUAL', '--record', 'off')
     mission.write('fly')

@@ -19,7 +19,7 @@ from floor_plans.occupancy_map import write_map
 from launcher import cli
 from libs.floor_plans.tests.test_plan_photo import CORNERS, plan
 from libs.floor_plans.tests.test_rmf_building import building, level
-from tests.launcher.conftest import ROOT, USER_ENVIRON, Started
+from tests.launcher.conftest import ROOT, USER_ENVIRON, Started, gone
 
 PROCESS = ROOT / 'tests' / 'launcher' / 'mission_process.py'
 ELSEWHERE = ('git clone', 'python3 launch.py\n', 'launch.py --web\n', 'benchmarks/')
@@ -134,7 +134,12 @@ def test_the_page_about_your_building_does_what_it_says(
                 words = [*words_of(line, tmp_path), '--composed']
                 mission = start(*words, *AS_FAST_AS_NODES, str(ros_domain))
                 mission.until('arrived in R')
-                assert mission.end(signal.SIGINT)[0] == 0
+                # The recorder and the alarm look on from a process of their own.
+                found = re.findall(r'\(process (\d+)\)', '\n'.join(mission.lines))
+                processes = sorted({int(process) for process in found})
+                assert len(processes) == 2
+                assert mission.end(signal.SIGTERM)[0] == 0
+                assert gone(processes, 0)
                 driven += 1
             else:
                 said += carried_out(line, tmp_path, capfd)

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.early
 
 def test_minutes_of_trouble_cost_neither_collisions_nor_the_way_home() -> None:
     watch, trouble, _ = endurance.run(
-        ROOT / 'config' / 'seven_rooms.yaml', 150.0, seed=3, pause=(8.0, 20.0), log_level='info'
+        ROOT / 'config' / 'seven_rooms.yaml', 90.0, seed=3, pause=(6.0, 12.0), log_level='info'
     )
     assert sum(trouble.made.values()) >= 5
     assert watch.collisions == 0
