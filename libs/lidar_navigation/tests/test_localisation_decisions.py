@@ -13,8 +13,9 @@ import pytest
 from floor_plans import Grid
 from lidar_navigation import Localiser
 from lidar_navigation.geometry import Pose, Scan
-from lidar_navigation.localisation.belief import Rival
+from lidar_navigation.localisation.belief import Belief, Rival
 from lidar_navigation.localisation.pose_search import _apart, _overlap
+from lidar_navigation.localisation.scan_fit import Evidence
 
 HERE = (5.0, 5.0, 0.0)
 CLOSE = (5.6, 5.0, 0.0)
@@ -301,3 +302,22 @@ def test_a_pose_that_something_new_explains_is_kept_however_well_another_fits(
         localiser.move((0.1 * (step % 2), 0.0, 0.0))
         localiser.see(SCAN, 0.2 * step)
     assert (localiser.jumps > 0) is refutes
+
+
+def test_people_all_around_move_nobody_to_a_pose_from_which_rays_go_through_walls() -> None:
+    localiser: Any = Told()
+    people, through_walls = Evidence(0.15, 0.75, 0.1), Evidence(0.4, 0.1, 0.5)
+    localiser._fit.evidence = lambda pose, scan: through_walls if pose[0] > 10.0 else people
+    localiser.search = lambda scan: [(FAR, through_walls)]
+    for step in range(20):
+        moved(localiser, 0.1)
+        localiser.see(SCAN, 0.2 * step)
+    assert localiser.jumps == 0
+    assert localiser.lost
+
+
+def test_a_rival_that_is_as_likely_as_the_pose_is_not_followed() -> None:
+    belief = Belief(HERE)
+    belief.add([(CLOSE, 0.0), (FAR, 0.0)])
+    assert not belief.follow_best(0.0)
+    assert belief.pose == HERE

@@ -131,7 +131,7 @@ class Belief:
         """Follow the likeliest rival if it is so much likelier, or a push off.
 
         Args:
-            margin: The least log odds.
+            margin: The log odds that it must exceed.
 
         Returns:
             Whether another pose is followed now; the one before is a rival of it.
@@ -140,7 +140,7 @@ class Belief:
             return False
         best = self.rivals[0]
         is_push = self.prior(best.pose) > -CARRIED
-        if best.odds < (0.0 if is_push else margin):
+        if best.odds <= (0.0 if is_push else margin):
             return False
         before = Rival(self.pose, 0.0)
         self.pose = best.pose

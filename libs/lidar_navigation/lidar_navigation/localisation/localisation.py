@@ -24,7 +24,7 @@ import numpy as np
 
 from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed
-from lidar_navigation.localisation.belief import CHANCE, SURE, Belief, told
+from lidar_navigation.localisation.belief import SURE, Belief, told
 from lidar_navigation.localisation.odometry import ContinuousOdometry
 from lidar_navigation.localisation.pose_search import found_poses
 from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
@@ -254,14 +254,19 @@ class Localiser:
     def _followed(self, evidence: Evidence, thin: Scan) -> Evidence:
         """Follow another pose if the odds say so; return what the scan says of the one followed.
 
-        A pose that something new explains is kept, however well another one fits.
+        A pose that something new explains is kept, however well another one fits. So is one that
+        this scan contradicts less than the other: people all around hide what tells them apart.
         """
-        margin = CHANCE if self._shaken else SURE
-        is_kept = not (self._shaken or evidence.refutes)
-        if is_kept or not self._belief.follow_best(margin):
+        if not (self._shaken or evidence.refutes) or not self._belief.rivals:
+            return evidence
+        likeliest = self._belief.rivals[0].pose
+        there = self._fit.evidence(likeliest, thin.thinned(self.parameters.cast_rays))
+        if there.log_likelihood < evidence.log_likelihood:
+            return evidence
+        if not self._belief.follow_best(0.0 if self._shaken else SURE):
             return evidence
         self.jumps += 1
-        return self._fit.evidence(self.pose, thin.thinned(self.parameters.cast_rays))
+        return there
 
     def _is_due(self, now: float) -> bool:
         p = self.parameters
