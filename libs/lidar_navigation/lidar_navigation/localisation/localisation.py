@@ -24,7 +24,7 @@ import numpy as np
 
 from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed
-from lidar_navigation.localisation.belief import SURE, Belief, told
+from lidar_navigation.localisation.belief import CHANCE, SURE, Belief, told
 from lidar_navigation.localisation.odometry import ContinuousOdometry
 from lidar_navigation.localisation.pose_search import found_poses
 from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
@@ -263,7 +263,7 @@ class Localiser:
         there = self._fit.evidence(likeliest, thin.thinned(self.parameters.cast_rays))
         if there.log_likelihood < evidence.log_likelihood:
             return evidence
-        if not self._belief.follow_best(0.0 if self._shaken else SURE):
+        if not self._belief.follow_best(CHANCE if self._shaken else SURE):
             return evidence
         self.jumps += 1
         return there
