@@ -62,8 +62,8 @@ def main(argv: list[str]) -> int:
         return int(modules[0].main(arguments) or 0)
     from surveillance_runtime.process import run_nodes
 
-    for module in modules:
-        if prepare := getattr(module, 'prepare_process', None):
+    for each in modules:
+        if prepare := getattr(each, 'prepare_process', None):
             prepare()
     classes = [getattr(module, parsed[i][2]) for i, module in enumerate(modules)]
     return run_nodes(classes, arguments)
