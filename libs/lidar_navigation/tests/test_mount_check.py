@@ -95,6 +95,25 @@ def test_wheels_of_another_size_are_named_with_the_scale_that_fits(
     assert way <= 0.45
 
 
+def test_whoever_is_pushed_while_it_turns_has_no_wrong_mount() -> None:
+    seed = random.randrange(1_000_000)
+    print('seed', seed)
+    draw = random.Random(seed)
+    for _ in range(30):
+        flat, check = Flat(), MountCheck(Mount())
+        pose, odometry = (1.0, 1.0, draw.uniform(-3, 3)), (0.0, 0.0, 0.0)
+        pushed_at, turn = draw.randrange(3, 30), draw.choice([-0.06, 0.06])
+        for number in range(30):
+            step = (0.012, 0.0, turn)
+            pose, odometry = composed(pose, step), composed(odometry, step)
+            if number == pushed_at:
+                # Also by more than a scan is looked for, and to another end of the room.
+                by = draw.uniform(-1.6, 1.6)
+                pose = (draw.uniform(0.8, 2.5), draw.uniform(0.6, 1.5), pose[2] + by)
+            finding = check.see(flat.scan(pose), odometry)
+            assert finding is None or finding.fits, (number, pushed_at, finding.text)
+
+
 def test_whatever_is_mounted_as_said_fits_with_wheels_that_are_worn() -> None:
     seed = random.randrange(1_000_000)
     print('seed', seed)

@@ -19,6 +19,7 @@ import cmath
 import math
 from collections import deque
 from dataclasses import dataclass, field
+from statistics import median
 
 import numpy as np
 
@@ -44,6 +45,8 @@ _BASE_WAY, _BASE_TURN = 0.3, 0.6
 and the odometry's turn may be off itself."""
 _KEPT = 8
 """So many parts count; older ones are forgotten."""
+_FEWEST_TURNS = 3
+"""So many parts tell of turns: somebody who pushes the robot in one of them decides nothing."""
 _LEAST_SHARE = 0.5
 """Where the scans have less than this share of a way or turn, or more by as much, wheels slip, or
 somebody pushes."""
@@ -194,13 +197,13 @@ class MountCheck:
         deviation = np.sqrt(covariance.diagonal())
         is_over = math.hypot(*driven[:2]) >= _BASE_WAY or abs(driven[2]) >= _BASE_TURN
         if abs(turn) >= _PART_TURN:
-            if deviation[2] <= _SURE:
-                self._turns.append((turn, angle_between(self._turn_from[1][2], found.pose[2])))
+            turned = angle_between(self._turn_from[1][2], found.pose[2])
+            if deviation[2] <= _SURE and _is_driven(turned / turn):
+                self._turns.append((turn, turned))
             self._turn_from = driven, found.pose
         if abs(way) >= (_LEAST_WAY if is_over else _PART_WAY):
             seen = self._lidar_way(found.pose) - self._lidar_way(self._way_from[1])
-            is_driven = _LEAST_SHARE <= abs(seen) / abs(way) <= 1 / _LEAST_SHARE
-            if is_driven and deviation.max() <= _SURE:
+            if _is_driven(abs(seen) / abs(way)) and deviation.max() <= _SURE:
                 self._ways.append((way, seen))
                 bent = abs(angle_between(self._way_from[0][2], driven[2]))
                 self._bends.append((_WAY_NOISE + _LEVER * bent) / abs(way))
@@ -255,11 +258,10 @@ class MountCheck:
 
     def _scale_of_turns(self) -> float | None:
         """Return how much the robot turned in the scans for each radian of the odometry."""
-        if sum(abs(turn) for turn, _ in self._turns) < TURN:
+        is_long = sum(abs(turn) for turn, _ in self._turns) >= TURN
+        if not is_long or len(self._turns) < _FEWEST_TURNS:
             return None
-        ratio = sum(turn * seen for turn, seen in self._turns) / sum(
-            turn * turn for turn, _ in self._turns
-        )
+        ratio = median(seen / turn for turn, seen in self._turns)
         return ratio if abs(ratio) >= _LEAST_SHARE else None
 
     def _ratio(self, is_flipped: bool) -> tuple[complex, bool]:
@@ -283,6 +285,11 @@ class MountCheck:
 
     def _is_steady(self, scale: float) -> bool:
         return all(abs(abs(seen) / abs(way) - scale) <= _STEADY for way, seen in self._ways)
+
+
+def _is_driven(share: float) -> bool:
+    """Tell whether the wheels moved the robot, by what the scans have of the odometry's part."""
+    return _LEAST_SHARE <= abs(share) <= 1 / _LEAST_SHARE
 
 
 _NOTHING: Pose = (0.0, 0.0, 0.0)
