@@ -266,7 +266,7 @@ def test_a_pose_that_the_lidar_contradicts_is_told_of_and_no_visit_is_believed(
     graph: Any, servers: Servers, flat: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pose_doubt, 'AFTER', 0.0)
-    monkeypatch.setattr(nav2_motion, 'LOOK_AT_SCANS', 0.0)
+    monkeypatch.setattr(pose_doubt, 'LOOK_PERIOD', 0.0)
     said = graph.said()
     recorder = Recorder()
     motion = nav2(graph, recorder, flat)
@@ -281,7 +281,7 @@ def test_a_pose_that_the_lidar_contradicts_is_told_of_and_no_visit_is_believed(
         for link in links:
             link.header.stamp = stamp
         frames.publish(TFMessage(transforms=links))
-        graph.until(lambda: motion._doubt.trace.is_past(stamp.sec + 1e-9 * stamp.nanosec))
+        graph.until(lambda: motion._doubt._trace.is_past(stamp.sec + 1e-9 * stamp.nanosec))
 
     def seen_from(x: float) -> None:
         for _ in range(2):

@@ -58,6 +58,7 @@ from surveillance_controllers.motion.nav2_goals import (
 )
 from surveillance_controllers.motion.place_recording import PlaceRecorder
 from surveillance_controllers.motion.pose_doubt import PoseDoubt
+from surveillance_controllers.motion.pose_reports import POSE
 from surveillance_runtime.conversions import (
     pose_estimate,
     pose_from,
@@ -89,13 +90,10 @@ POSE_PERIOD = 0.2
 STALLED = 90.0
 """A robot that has not moved for so long on its way is not brought there, seconds: some server
 never answers, or a costmap does not clear. Nav2's own recoveries are through before."""
-LOOK_AT_SCANS = 1.0
-"""Time between two scans that are compared with the map, seconds."""
-POSE_CAUSE = ('robot', 'pose')
 MOVED = 0.25
 """It has moved when it is this far from where it was, metres."""
 
-STEADY = 0.3
+MOST_TURN_RATE = 0.3
 """Doors are read while the robot turns no faster, rad/s: `tf` says where it is a little later than
 the scan was made."""
 
@@ -324,8 +322,8 @@ class Nav2Motion:
             pose, stamp = found
             self._take(pose)
             self._publish(pose, stamp)
-            self._doubt.trace.add(stamp, pose)
-            self._compare()
+            if (compared := self._doubt.take_pose(stamp, pose)) is not None:
+                self._tell_doubt(compared)
         if self._drive is not None:
             progress, stalled, run = self._drive
             if self.hold.active:
@@ -334,12 +332,10 @@ class Nav2Motion:
                 stalled.set()
 
     def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
-        """Read the doors by a scan, if it is known from where it was made; keep one a second to
-        compare it with the map.
+        """Read the doors by a scan, if it is known from where it was made; offer it for a
+        comparison with the map.
         """
-        if time.monotonic() - self._doubt.looked_at >= LOOK_AT_SCANS:
-            self._doubt.looked_at = time.monotonic()
-            self._doubt.scan = scan, seconds_of(message.header.stamp)
+        self._doubt.offer(scan, seconds_of(message.header.stamp), time.monotonic())
         found = self._tf.pose(self._frames.base, self._frames.map, FRESH)
         before, self._seen_from = self._seen_from, None
         if found is None:
@@ -348,7 +344,7 @@ class Nav2Motion:
         self._seen_from = pose, now
         if before is not None and 0.0 < now - before[1] < FRESH:
             turned = abs(angle_between(before[0][2], pose[2]))
-            if turned <= STEADY * (now - before[1]) and not self._doubt.in_doubt:
+            if turned <= MOST_TURN_RATE * (now - before[1]) and not self._doubt.in_doubt:
                 self._doors.see(pose, scan, now)
 
     def _publish(self, pose: Pose, stamp: float) -> None:
@@ -386,23 +382,17 @@ class Nav2Motion:
             self._doubt.set_map(grid)
             self._tell_pose()
 
-    def _compare(self) -> None:
-        """Compare a scan with the map, from where the robot was said to be then."""
-        if self._doubt.scan is None or not self._doubt.trace.is_past(self._doubt.scan[1]):
-            return
-        (scan, stamp), self._doubt.scan = self._doubt.scan, None
-        pose = self._doubt.trace.at(stamp)
-        if pose is None:
-            return
-        if self._doubt.look(pose, scan, stamp):
+    def _tell_doubt(self, pose: Pose) -> None:
+        """Tell whether a pose fits what the lidar saw from there."""
+        if self._doubt.in_doubt:
             x, y, _ = pose
             self._node.incidents.begin(
-                POSE_CAUSE,
+                POSE,
                 f'the pose that Nav2 tells, ({x:.1f}, {y:.1f}), does not fit what the lidar sees',
                 action='set the pose, in RViz by 2D Pose Estimate, or load the right map',
             )
         else:
-            self._node.incidents.end(POSE_CAUSE, 'the pose fits what the lidar sees')
+            self._node.incidents.end(POSE, 'the pose fits what the lidar sees')
 
     def _set_positions(self, positions: Mapping[str, Points]) -> None:
         with self._lock:

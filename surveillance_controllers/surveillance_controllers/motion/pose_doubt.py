@@ -25,13 +25,15 @@ HITS = 0.45
 that were right within 0.4 m 99 had at most 0.23 that went through and at least 0.52 that hit.)"""
 HITS_AGAIN = 0.6
 """It fits again from this part on."""
+LOOK_PERIOD = 1.0
+"""Time between two scans that are compared with the map, seconds."""
 AFTER = 5.0
 """A pose is in doubt that has not fitted for so long, seconds."""
 KEPT = 20
 """So many poses are kept for the scans that come behind them."""
 WIDEST_GAP = 0.6
 """Between two poses that are farther apart, seconds, nobody knows where the robot was;"""
-STEADY = 0.1
+MOST_TURN = 0.1
 """nor, exactly enough, where it turned by more than this, rad."""
 
 
@@ -58,7 +60,7 @@ class PoseTrace:
         for (before, a), (after, b) in pairwise(self._poses):
             if before <= stamp <= after:
                 turn = angle_between(a[2], b[2])
-                if after - before > WIDEST_GAP or abs(turn) > STEADY:
+                if after - before > WIDEST_GAP or abs(turn) > MOST_TURN:
                     return None
                 part = (stamp - before) / (after - before)
                 x, y = (p + part * (q - p) for p, q in zip(a[:2], b[:2], strict=True))
@@ -71,23 +73,47 @@ class PoseDoubt:
 
     Attributes:
         in_doubt: Whether the pose has not fitted for a while.
-        trace: Where the robot was said to be.
-        scan: A scan and its stamp, until the pose of that time is told.
-        looked_at: When it came, steady seconds.
     """
 
     def __init__(self) -> None:
         self._fit: ScanFit | None = None
         self._since: float | None = None
         self.in_doubt = False
-        self.trace = PoseTrace()
-        self.scan: tuple[Scan, float] | None = None
-        self.looked_at = -math.inf
+        self._trace = PoseTrace()
+        self._scan: tuple[Scan, float] | None = None
+        self._offered_at = -math.inf
 
     def set_map(self, grid: Grid) -> None:
         """Take the map that the pose is told in."""
         self._fit = ScanFit(grid)
         self._since = None
+
+    def offer(self, scan: Scan, stamp: float, now: float) -> None:
+        """Keep a scan each `LOOK_PERIOD` until the pose of its time is told.
+
+        Args:
+            scan: The scan.
+            stamp: Its time, seconds.
+            now: Steady time, seconds.
+        """
+        if now - self._offered_at >= LOOK_PERIOD:
+            self._offered_at = now
+            self._scan = scan, stamp
+
+    def take_pose(self, stamp: float, pose: Pose) -> Pose | None:
+        """Take where the robot is said to be at a time, seconds, map frame.
+
+        Returns:
+            The pose with which a scan was compared now; None: none was.
+        """
+        self._trace.add(stamp, pose)
+        if self._scan is None or not self._trace.is_past(self._scan[1]):
+            return None
+        (scan, made), self._scan = self._scan, None
+        there = self._trace.at(made)
+        if there is not None:
+            self.look(there, scan, made)
+        return there
 
     def look(self, pose: Pose, scan: Scan, now: float) -> bool:
         """Take a scan from a pose; return whether the pose is in doubt.
