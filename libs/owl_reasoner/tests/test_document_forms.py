@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from owl_reasoner import OntologyFileError, read_ontology
-from owl_reasoner.documents.replacing import replace_file
 from owl_reasoner.owl import axioms as ax
 from owl_reasoner.owl import expressions as ex
 from owl_reasoner.owl.axioms import Axiom
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import RDF, RDFS, XSD
+from strict_files.regular_files import replace_file
 
 COMMENT = RDFS + 'comment'
 OWL_XML = (
@@ -220,7 +220,7 @@ def test_a_file_is_replaced_in_one_piece(tmp_path: Path, monkeypatch: pytest.Mon
     replace_file(tmp_path / 'new', b'four')  # Where nothing is yet, nobody need ask.
     monkeypatch.undo()
     for no_file in (tmp_path, os.devnull):
-        with pytest.raises(OSError, match='expected a regular file') as refused:
+        with pytest.raises(OSError, match='expected a file, got') as refused:
             replace_file(no_file, b'five')
         assert (refused.value.errno, refused.value.filename) == (errno.EINVAL, str(no_file))
     monkeypatch.setattr(

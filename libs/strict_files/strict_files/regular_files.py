@@ -118,7 +118,7 @@ def replace_file(path: str | Path, data: bytes, *, durable: bool = False) -> Non
             draft.unlink()
     if durable:
         with suppress(OSError):
-            _sync_folder(target.parent)
+            sync_folder(target.parent)
 
 
 def _take_rights(handle: int, before: os.stat_result) -> None:
@@ -165,7 +165,12 @@ def _drafts(target: Path) -> str:
     return f'.{os.fsdecode(os.fsencode(target.name)[:200])}.'
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
+    """Wait until the disk has what was made, renamed or removed in a folder.
+
+    Raises:
+        OSError: There is no such folder, or the disk fails.
+    """
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

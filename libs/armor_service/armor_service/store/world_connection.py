@@ -20,6 +20,7 @@ from urllib.parse import quote
 from armor_service.protocol import StoreError
 from armor_service.store.salvage import salvage
 from armor_service.store.world_ontology import Quad, WorldNames, WorldOntology
+from strict_files.regular_files import sync_folder
 
 INFERRED = 'http://inferrences/'
 """owlready2's ontology of what a reasoner found (spelled so)."""
@@ -153,7 +154,7 @@ class WorldConnection:
         world.close()
         new.rename(self.path)
         if self._synced:
-            _sync_directory(self.path.parent)
+            sync_folder(self.path.parent)
 
     def open(self) -> sqlite3.Connection:
         """Return the open file, with the service's tables and triggers.
@@ -412,11 +413,3 @@ def count_step(net: dict[Any, int], what: Any, step: int) -> None:
         del net[what]
     else:
         net[what] = step
-
-
-def _sync_directory(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -10,7 +10,6 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from owl_reasoner.documents.rdf_xml import Node, Triple
-from owl_reasoner.documents.replacing import replace_file
 from owl_reasoner.documents.triples import triples_of
 from owl_reasoner.documents.xml_reading import FORBIDDEN, OntologyFileError
 from owl_reasoner.gc_control import collected
@@ -23,6 +22,7 @@ from owl_reasoner.owl.axioms import (
 )
 from owl_reasoner.owl.expressions import Literal
 from owl_reasoner.owl.vocabulary import OWL, RDF, RDFS, SWRL, XSD
+from strict_files.regular_files import replace_file
 from strict_files.suggestions import nearest
 
 FORMATS = ('rdfxml', 'ntriples', 'nquads', 'manchester')
