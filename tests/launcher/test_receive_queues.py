@@ -119,7 +119,8 @@ def test_who_else_sends_to_a_deaf_process_is_named() -> None:
         'sys.stdin.read()\n'
     )
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as deaf:
-        for port in range(7400 + 250 * 99 + 10, 7400 + 250 * 100):
+        # From the end: nobody has so many participants in a domain that he looks for one there.
+        for port in reversed(range(7400 + 250 * 99 + 10, 7400 + 250 * 100)):
             with contextlib.suppress(OSError):
                 deaf.bind(('127.0.0.1', port))
                 break
@@ -133,4 +134,5 @@ def test_who_else_sends_to_a_deaf_process_is_named() -> None:
             assert not watch.look([here], 0.0)
             text = watch.look([here], DEAF_AFTER)[here]
             stranger.communicate('')
-    assert f'; besides this launch there sends process {stranger.pid} (' in text
+    assert '; besides this launch there sends ' in text
+    assert f'process {stranger.pid} (' in text  # among others: all of the machine may send there
