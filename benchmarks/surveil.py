@@ -49,11 +49,11 @@ from indoor_watch import (
 from indoor_watch.day_book import DayBook
 from indoor_watch.evidence import BLURRED
 from indoor_watch.hung_markers import CameraView, SeenMarker
+from indoor_watch.passages import Passages
 from indoor_watch.persons import load_finder
 from indoor_watch.privacy import blurred_at_rest
 from indoor_watch.viewpoints import Viewpoints
 from indoor_watch.views import view_changes
-from indoor_watch.ways import Ways
 from marker_detection.camera_model import CameraModel
 from marker_detection.detector import DetectorSettings, MarkerDetector
 from marker_detection.pose import pose_of
@@ -181,17 +181,17 @@ class Rounds:
             alert=self._on_alert,
             doors={name: door.segment for name, door in world.plan.doors.items()},
             rooms=Rounds.rooms,
-            ways_of=self._ways,
+            passages_of=self._passages,
             find_persons=persons,
             verify_seconds=verify_seconds,
         )
         self.watcher.use_map(Rounds.grid)
 
-    def _ways(self, grid: Grid) -> Ways:
+    def _passages(self, grid: Grid) -> Passages:
         plan = self.world.plan
         doors = {name: door.segment for name, door in plan.doors.items()}
         points = {name: (at[0], at[1]) for name, at in plan.place.positions.items()}
-        return Ways(grid, RADIUS, doors, points)
+        return Passages(grid, RADIUS, doors, points)
 
     def _on_alert(self, event: Event) -> None:
         self.alerts.append(event)
@@ -231,7 +231,7 @@ class Rounds:
             period: Between two sweeps, seconds.
         """
         before = len(self.told)
-        self.drive(self.way(place))
+        self.drive(self.passage(place))
         here = self.at
         for each in range(looks):
             self.advance(period)
@@ -251,10 +251,10 @@ class Rounds:
         sunny = 9 <= datetime.fromtimestamp(self.time, UTC).hour < 17 and self.rng.random() < 0.3
         return LIGHTS[int(self.rng.integers(3, 5))] if sunny else LIGHTS[0]
 
-    def drive(self, way: Sequence[tuple[float, float]]) -> None:
+    def drive(self, passage: Sequence[tuple[float, float]]) -> None:
         """Drive along points, and compare sweeps on the way."""
         here = self.at
-        for there in way:
+        for there in passage:
             length = math.dist(here, there)
             yaw = math.atan2(there[1] - here[1], there[0] - here[0])
             for each in range(1, max(2, math.ceil(length / STEP) + 1)):
@@ -341,7 +341,7 @@ class Rounds:
                 self.watcher.assess(self.time)
                 self.watcher.doubts(self.time)
 
-    def way(self, place: str) -> list[tuple[float, float]]:
+    def passage(self, place: str) -> list[tuple[float, float]]:
         """Return the doors on the way to a place, and its point."""
         doors = [self.world.plan.doors[each] for each in self.doors_to(place)]
         goal = self.world.plan.place.positions[place]
@@ -351,17 +351,17 @@ class Rounds:
         """Return the doors on the way to a place."""
         rooms = self.world.plan.place.rooms
         begin = self.world.place_at(*self.at)
-        open_ways: list[tuple[str, list[str]]] = [(str(begin), [])]
+        open_passages: list[tuple[str, list[str]]] = [(str(begin), [])]
         seen = {begin}
-        while open_ways:
-            room, doors = open_ways.pop(0)
+        while open_passages:
+            room, doors = open_passages.pop(0)
             if room == place:
                 return doors
             for other, its_doors in rooms.items():
                 for door in set(its_doors) & set(rooms[room]):
                     if other not in seen:
                         seen.add(other)
-                        open_ways.append((other, [*doors, door]))
+                        open_passages.append((other, [*doors, door]))
         raise ValueError(f'no way to {place}')
 
 
@@ -1424,7 +1424,7 @@ def _look_and_verify(rounds: Rounds, place: str, kind: str, pictures: bool) -> t
     """
     looked: set[int] = set()
     seen_from = len(rounds.told)
-    rounds.drive(rounds.way(place))
+    rounds.drive(rounds.passage(place))
     for _ in range(3):
         rounds.stand(6.5, pictures=pictures)
         rounds.verify(place, looked)

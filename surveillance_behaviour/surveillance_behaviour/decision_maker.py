@@ -375,9 +375,9 @@ class DecisionMaker:
         """Return the seconds for which a place is explored; ``usual`` unless it differs."""
         return self._rules.exploration.get(place, usual)
 
-    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
+    def detour(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places of another way between two neighbours; empty when there is none."""
-        return self._map.way_round(start, goal)
+        return self._map.detour(start, goal)
 
     # What came of it.
 

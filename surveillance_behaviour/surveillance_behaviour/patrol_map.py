@@ -136,7 +136,7 @@ class PatrolMap:
             if place in positions
         }
 
-    def way_round(self, start: str, goal: str) -> tuple[str, ...]:
+    def detour(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places of another way between two neighbours; empty when there is none."""
         try:
             return self.graph.without_leg(start, goal).route(start, goal)

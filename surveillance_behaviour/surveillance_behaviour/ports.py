@@ -157,7 +157,7 @@ class Reasoner(Protocol):
         """Note that the battery was charged."""
         return
 
-    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
+    def detour(self, start: str, goal: str) -> tuple[str, ...]:
         """Return the places of another way between two neighbours, ``goal`` included; empty:
         none.
         """

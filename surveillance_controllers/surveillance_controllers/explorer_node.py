@@ -269,8 +269,8 @@ class Explorer(PatrolNode):
                 goal = aim
                 if is_another:
                     self.get_logger().info(
-                        f'to ({x:.1f}, {y:.1f}), {aim.way:.1f} m away: {aim.length:.1f} m of the '
-                        'unknown begin there'
+                        f'to ({x:.1f}, {y:.1f}), {aim.path_length:.1f} m away: {aim.length:.1f} m '
+                        'of the unknown begin there'
                     )
             self._tell_left_out()
             missing = self._missing()

@@ -16,8 +16,8 @@ from floor_plans.fleet import (
     FleetMember,
     points_to_pass,
     robots_in_a_row,
+    wide_passages,
     wide_places,
-    wide_ways,
     with_points,
 )
 from strict_files.suggestions import nearest
@@ -137,7 +137,7 @@ def team_parts(
     moved = points_to_pass(place.plan, reach)
     plan = with_points(place.plan, moved)
     shared_by_all: list[tuple[str, object]] = [
-        ('traffic.wide_ways', list(wide_ways(plan, reach))),
+        ('traffic.wide_ways', list(wide_passages(plan, reach))),
         ('traffic.wide_places', list(wide_places(plan, reach))),
     ]
     if any(member.dock for member in fleet):

@@ -35,7 +35,7 @@ def test_the_map_is_the_part_that_can_be_reached_and_stays_the_same_object() -> 
     assert here.update(snapshot(), {'R1': 9.0}, NOBODY).own_exploration == {'R1': 9.0}
     assert here.metres('C1', 'R1') == 3.0
     assert here.metres('C1', 'R9') == 0.0
-    assert here.way_round('C1', 'R1') == ()
+    assert here.detour('C1', 'R1') == ()
     station = Station((10.0, 6.0, 0.0))
     assert here.approaches({'R1': station, 'R9': station}) == {'R1': 1.0}
 

@@ -122,7 +122,7 @@ def test_the_frontier_of_a_hall_is_one_line() -> None:
     assert found.length == pytest.approx(3.9, abs=0.1)
     assert found.viewpoint is not None
     assert found.viewpoint[0] == pytest.approx(3.6, abs=0.2)
-    assert found.way == pytest.approx(2.6, abs=0.4)
+    assert found.path_length == pytest.approx(2.6, abs=0.4)
 
 
 def test_a_viewpoint_that_showed_nothing_is_not_tried_again() -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse.csgraph import dijkstra
 
 from surveillance_simulation.robot.robot import Robot
-from surveillance_simulation.world.people import People, PeopleModel, _Ways
+from surveillance_simulation.world.people import People, PeopleModel, _WalkingPaths
 from surveillance_simulation.world.simulated_place import SimulatedPlace
 from tests.places import seven_rooms, two_rooms
 
@@ -84,7 +84,7 @@ def straight_costs(world: SimulatedPlace, reach: float) -> tuple[np.ndarray, np.
 def test_the_way_that_is_left_is_the_shortest_one_that_keeps_off_the_walls() -> None:
     """Beside Dijkstra's search of SciPy over the cells of the two rooms."""
     world = two_rooms()
-    ways = _Ways(world.plan, 0.28)
+    paths = _WalkingPaths(world.plan, 0.28)
     free, cost = straight_costs(world, 0.28)
     number = np.arange(free.size).reshape(free.shape)
     edges: list[tuple[int, int, float]] = []
@@ -99,32 +99,32 @@ def test_the_way_that_is_left_is_the_shortest_one_that_keeps_off_the_walls() -> 
     for start, end, length in edges:
         graph[start, end] = length
     for goal in ('A', 'B'):
-        x, y = ways.point(goal)
+        x, y = paths.point(goal)
         cell = int(number[int(y / 0.1 + 1e-9), int(x / 0.1 + 1e-9)])
         expected = dijkstra(graph, directed=False, indices=np.array([cell]))[0].reshape(free.shape)
         for row, column in np.argwhere(np.isfinite(expected))[::7]:
             at = (column + 0.5) * 0.1, (row + 0.5) * 0.1
-            assert ways.is_free(at)
-            assert ways.left(goal, at) == pytest.approx(0.1 * expected[row, column], rel=1e-3)
+            assert paths.is_free(at)
+            assert paths.left(goal, at) == pytest.approx(0.1 * expected[row, column], rel=1e-3)
         for row, column in np.argwhere(~free)[::11]:
-            assert not ways.is_free(((column + 0.5) * 0.1, (row + 0.5) * 0.1))
-    assert not ways.is_free((-1.0, 1.0))
+            assert not paths.is_free(((column + 0.5) * 0.1, (row + 0.5) * 0.1))
+    assert not paths.is_free((-1.0, 1.0))
 
 
 def test_who_follows_the_way_comes_nearer_with_each_step_and_ends_at_the_point() -> None:
-    ways = _Ways(two_rooms().plan, 0.3)
+    paths = _WalkingPaths(two_rooms().plan, 0.3)
     at, before = (0.6, 1.6), math.inf
     for _ in range(60):
-        ahead = ways.direction('B', at)
+        ahead = paths.direction('B', at)
         at = at[0] + 0.1 * math.cos(ahead), at[1] + 0.1 * math.sin(ahead)
-        assert ways.is_free(at)
+        assert paths.is_free(at)
         if math.dist(at, (5.0, 1.0)) < 0.1:
             break
-        left = ways.left('B', at)
+        left = paths.left('B', at)
         assert left < before + 0.02
         before = left
     assert math.dist(at, (5.0, 1.0)) < 0.1
-    assert ways.direction('B', (5.04, 1.0)) == pytest.approx(math.pi, abs=0.8)
+    assert paths.direction('B', (5.04, 1.0)) == pytest.approx(math.pi, abs=0.8)
 
 
 @pytest.mark.parametrize(('speed', 'dt'), [(1.2, 0.1), (0.5, 0.05)])

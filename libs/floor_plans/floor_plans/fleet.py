@@ -214,7 +214,7 @@ def with_points(plan: FloorPlan, points: Mapping[str, tuple[float, float]]) -> F
     return replace(plan, place=replace(plan.place, positions=positions))
 
 
-def wide_ways(plan: FloorPlan, radius: float) -> tuple[str, ...]:
+def wide_passages(plan: FloorPlan, radius: float) -> tuple[str, ...]:
     """Return the pairs of places, as `A B`, between which two robots can pass in a door."""
     needed = 4.0 * radius + 3.0 * _PASSING
     return tuple(

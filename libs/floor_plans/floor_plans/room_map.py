@@ -30,23 +30,23 @@ class FloorPart:
         at: A point in it, x and y in metres.
         area: Square metres.
         cells: Its cells, shape of the grid.
-        ways: Names of the walls that close a gap of the map towards a room, with that room.
+        gaps: Names of the walls that close a gap of the map towards a room, with that room.
         is_outside: Whether it reaches to the edge of the map all around.
     """
 
     at: Point
     area: float
     cells: npt.NDArray[np.bool_]
-    ways: Mapping[str, str]
+    gaps: Mapping[str, str]
     is_outside: bool
 
     def reason(self, plan: FloorPlan) -> str:
         """Return why it is no room, in words."""
         if self.is_outside:
             return 'outside of the building'
-        if not self.ways:
+        if not self.gaps:
             return 'no door: walls all around'
-        widest = max(plan.walls[name].length for name in self.ways)
+        widest = max(plan.walls[name].length for name in self.gaps)
         return f'its way in is closed: a wall of {widest:.2f} m'
 
 

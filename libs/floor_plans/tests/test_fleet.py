@@ -14,8 +14,8 @@ from floor_plans.fleet import (
     points_to_pass,
     problem_in_robot_name,
     robots_in_a_row,
+    wide_passages,
     wide_places,
-    wide_ways,
     with_points,
 )
 from floor_plans.occupancy_grid import distance_to
@@ -124,7 +124,7 @@ def test_where_robots_can_pass_each_other_is_measured() -> None:
     assert points_to_pass(with_points(PLAN, found), radius) == {}
     widths = {name: door.width for name, door in PLAN.doors.items()}
     narrow = 4 * radius + 0.6
-    wide = wide_ways(PLAN, radius)
+    wide = wide_passages(PLAN, radius)
     assert len(wide) == sum(width >= narrow for width in widths.values())
     broad = replace(PLAN, doors={**PLAN.doors, 'D1': replace(PLAN.doors['D1'], width=narrow)})
-    assert ' '.join(sorted(PLAN.place.doors['D1'])) in wide_ways(broad, radius)
+    assert ' '.join(sorted(PLAN.place.doors['D1'])) in wide_passages(broad, radius)

@@ -19,7 +19,7 @@ Public modules: `answers` (what a person says of events), `work_queue` (of one t
 `hung_markers` (where markers hang), `inspection_plan`, `marker_checks` and `viewpoints` (from where
 to look), `lost_sight` (what of the sensors was of no use), `other_robots`, `persons` (who is in a
 picture), `privacy` (pictures that may leave the machine), `reference_views`, `sees_around`, `views`
-(what differs between two pictures), `visit`, `ways` (what a thing blocks).
+(what differs between two pictures), `visit`, `passages` (what a thing blocks).
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from indoor_watch.marker_monitor import MarkerMonitor
 from indoor_watch.movables import Movables
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.other_robots import OtherRobots
+from indoor_watch.passages import Passages
 from indoor_watch.person_monitor import PersonMonitor
 from indoor_watch.persons import Person, Picture
 from indoor_watch.reference_views import ReferenceViews, Viewpoint
@@ -33,7 +34,6 @@ from indoor_watch.view_monitor import LightMonitor, ViewMonitor
 from indoor_watch.views import Sight, grey_of
 from indoor_watch.visit import CameraShot, Coverage, LidarSweep, Mask, Points, Rooms, Visit
 from indoor_watch.watch_rules import WatchRule
-from indoor_watch.ways import Ways
 
 SET_BACK = 30.0
 """A clock that is earlier by more was set back, seconds: work may wait for so long."""
@@ -58,7 +58,7 @@ class ChangeMonitor:
         markers: The ids that hang here, and where, map frame, metres; None: that is learned. Empty:
             all that is seen is known.
         rooms: Which place is where; None: a thing is in the robot's place.
-        ways_of: Returns the ways of a map; None: no way is looked at.
+        passages_of: Returns the passages of a map; None: none is looked at.
         find_persons: Finds the persons in a picture; None: the lidar sees those who walk.
         covered: Called with what each visit to a place saw, when it ends.
         store: Keeps pictures; None: nothing is kept.
@@ -84,7 +84,7 @@ class ChangeMonitor:
         doors: Mapping[str, Segment] | None = None,
         markers: Mapping[int, tuple[float, float, float] | None] | None = None,
         rooms: Rooms | None = None,
-        ways_of: Callable[[Grid], Ways] | None = None,
+        passages_of: Callable[[Grid], Passages] | None = None,
         find_persons: Callable[[Picture], list[Person]] | None = None,
         covered: Callable[[Coverage], object] = lambda _: None,
         store: EvidenceStore | None = None,
@@ -96,7 +96,7 @@ class ChangeMonitor:
         self._others = others or OtherRobots(0.0)
         self._covered = covered
         self._doors = DoorMonitor(doors or {})
-        self._floor = FloorMonitor(self._doors.may_be_leaf, ways_of)
+        self._floor = FloorMonitor(self._doors.may_be_leaf, passages_of)
         self._persons = PersonMonitor(find_persons, (doors or {}).values())
         self._light = LightMonitor()
         self._views = ViewMonitor(views or ReferenceViews(), self._doors.near)

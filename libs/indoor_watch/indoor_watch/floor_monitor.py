@@ -1,4 +1,4 @@
-"""What stands on the floor where nothing stood, what is gone, and which ways that blocks.
+"""What stands on the floor where nothing stood, what is gone, and which passages that blocks.
 
 What the first look at each part of the floor shows is normal; what of it the map does not show is
 told once, so that a person accepts it. A thing must be seen in two assessments before it is told,
@@ -30,9 +30,9 @@ from indoor_watch.floor import (
 )
 from indoor_watch.movables import Movables
 from indoor_watch.observations import Kind, Observation
+from indoor_watch.passages import Passages
 from indoor_watch.persons import Picture
 from indoor_watch.visit import LidarSweep, Pictured, Visit
-from indoor_watch.ways import Ways
 
 Points = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -46,7 +46,7 @@ SPOT, SPOT_FREE = 0.15, 0.8
 OTHER_SIDES = 0.6
 """What is hidden so near to a new thing may be its other sides, metres."""
 BEHIND = 0.3
-"""Depth of what stands in a way, metres."""
+"""Depth of what stands in a passage, metres."""
 
 
 class FloorMonitor:
@@ -54,7 +54,7 @@ class FloorMonitor:
 
     Args:
         may_be_leaf: Tells of points (n, 2) whether they may be a door's leaf.
-        ways_of: Returns the ways of a map; None: no way is looked at.
+        passages_of: Returns the passages of a map; None: none is looked at.
 
     Attributes:
         grid: The map; None before it came.
@@ -65,10 +65,10 @@ class FloorMonitor:
     def __init__(
         self,
         may_be_leaf: Callable[[Points], bool],
-        ways_of: Callable[[Grid], Ways] | None = None,
+        passages_of: Callable[[Grid], Passages] | None = None,
     ) -> None:
-        self._may_be_leaf, self._ways_of = may_be_leaf, ways_of
-        self._ways: Ways | None = None
+        self._may_be_leaf, self._passages_of = may_be_leaf, passages_of
+        self._passages: Passages | None = None
         self._kept: Mapping[str, Any] = {}
         self.grid: Grid | None = None
         self.normal: FloorView | None = None
@@ -81,7 +81,7 @@ class FloorMonitor:
         if self.grid is not None and floor_layers.same_map(self.grid, grid):
             return False
         self.grid, self.normal, self._untold = grid, None, None
-        self._ways = None if self._ways_of is None else self._ways_of(grid)
+        self._passages = None if self._passages_of is None else self._passages_of(grid)
         if self._kept:
             self.normal = floor_layers.unpacked(self._kept, grid)
         return True
@@ -131,12 +131,12 @@ class FloorMonitor:
     def _blocked(
         self, now: FloorView, things: Sequence[ObjectChange], visit: Visit, stamp: float
     ) -> list[Observation]:
-        """Return the ways that are blocked by what was seen in two comparisons."""
+        """Return the passages that are blocked by what was seen in two comparisons."""
         new = [each.points for each in things if each.change != Change.REMOVED]
-        if self._ways is None or self.grid is None or self.normal is None or not new:
+        if self._passages is None or self.grid is None or self.normal is None or not new:
             return []
         there = self.normal.occupied.copy()
-        before = {(each.door, each.place) for each in self._ways.blocked(there)}
+        before = {(each.door, each.place) for each in self._passages.blocked(there)}
         cells = self.grid.cells_of(np.concatenate(new))
         there[cells[:, 0], cells[:, 1]] = True
         # Of a thing its front alone is seen: what lies hidden just behind it is taken for it, too.
@@ -152,7 +152,7 @@ class FloorMonitor:
                 0.9,
                 stamp,
             )
-            for each in self._ways.blocked(there)
+            for each in self._passages.blocked(there)
             if (each.door, each.place) not in before
         ]
 

@@ -17,10 +17,10 @@ from indoor_watch.day_book import DayBook, Seen
 from indoor_watch.habits import HARMONICS, WEEK, Habits, PeriodicState
 from indoor_watch.hung_markers import CameraView
 from indoor_watch.other_robots import OtherRobots
+from indoor_watch.passages import BlockedPassage, Passages
 from indoor_watch.person_places import place_of
 from indoor_watch.persons import Person
 from indoor_watch.watch_rules import severity_of
-from indoor_watch.ways import BlockedWay, Ways
 
 from .marked_walls import camera_pose
 
@@ -457,7 +457,7 @@ def test_a_person_is_neither_too_small_nor_too_tall_nor_in_the_air(
     assert (person_at(thing(1.0 + distance, 1.0), box) is not None) is found
 
 
-# --- ways ---
+# --- passages ---
 
 
 def rooms() -> tuple[Grid, dict[str, Any], dict[str, Any]]:
@@ -483,20 +483,20 @@ def stood(*boxes: tuple[float, float, float, float]) -> np.ndarray:
 
 def test_a_way_is_blocked_by_what_leaves_no_room_for_the_robot() -> None:
     grid, doors, points = rooms()
-    ways = Ways(grid, 0.2, doors, points)
-    assert ways.blocked(stood()) == []
-    assert ways.blocked(stood((1.5, 0.5, 1.7, 2.5))) == [], 'there is a way around'
-    (across,) = ways.blocked(stood((1.5, 0.05, 1.7, 2.95)))
+    free = Passages(grid, 0.2, doors, points)
+    assert free.blocked(stood()) == []
+    assert free.blocked(stood((1.5, 0.5, 1.7, 2.5))) == [], 'there is a way around'
+    (across,) = free.blocked(stood((1.5, 0.05, 1.7, 2.95)))
     assert (across.door, across.place) == ('D', 'A')
     assert across.position == pytest.approx((1.675, 1.475), abs=0.06)
-    door = ways.blocked(stood((2.9, 1.0, 3.2, 2.0)))
-    assert BlockedWay('D', '', door[0].position) == door[0]
+    door = free.blocked(stood((2.9, 1.0, 3.2, 2.0)))
+    assert BlockedPassage('D', '', door[0].position) == door[0]
     assert door[0].position == pytest.approx((3.0, 1.475), abs=0.06)
-    other = ways.blocked(stood((4.5, 0.05, 4.6, 2.95)))
+    other = free.blocked(stood((4.5, 0.05, 4.6, 2.95)))
     assert [(each.door, each.place) for each in other] == [('D', 'B')]
 
 
 def test_what_the_map_does_not_allow_is_no_way_that_could_be_blocked() -> None:
     grid, doors, points = rooms()
-    wide = Ways(grid, 0.55, doors, points)
+    wide = Passages(grid, 0.55, doors, points)
     assert [each.place for each in wide.blocked(stood((2.9, 1.0, 3.2, 2.0)))] == []

@@ -29,9 +29,9 @@ from indoor_watch.answers import answered
 from indoor_watch.hung_markers import CameraView
 from indoor_watch.motion import WalkFinder
 from indoor_watch.other_robots import OtherRobots
+from indoor_watch.passages import Passages
 from indoor_watch.persons import Person
 from indoor_watch.reference_views import ReferenceViews
-from indoor_watch.ways import Ways
 
 from .marked_walls import camera, camera_pose, hang, seen_at, wall
 
@@ -141,7 +141,7 @@ class Round:
             views=ReferenceViews(views),
             markers=markers,
             rooms=rooms or Halves(),
-            ways_of=lambda grid: Ways(
+            passages_of=lambda grid: Passages(
                 grid, 0.22, {'D1': DOOR}, {'R1': (3.0, 2.5), 'R2': (9.0, 2.5)}
             ),
             find_persons=find_persons,

@@ -89,7 +89,7 @@ def test_a_frontier_that_nobody_can_look_over_comes_last() -> None:
     found = find_frontiers(grid, cost, (4.0, 2.0, 0.0), FrontierParameters())
     assert [each.viewpoint is None for each in found] == [False, True]
     assert math.isinf(found[1].worth)
-    assert math.isinf(found[1].way)
+    assert math.isinf(found[1].path_length)
     assert found[1].middle == pytest.approx([6.75, 2.0], abs=0.11)
     viewpoint = found[0].viewpoint
     assert viewpoint is not None

@@ -53,7 +53,7 @@ def test_the_way_costs_what_the_cheapest_does(seed: int) -> None:
         cheapest = reference(cost, start, goal)
     except ValueError:
         pytest.skip('the discs leave no way')
-    way = GridSearch(cost).way(start, goal)
+    way = GridSearch(cost).path(start, goal)
     assert tuple(way[0]) == start
     assert tuple(way[-1]) == goal
     assert price(cost, way) <= cheapest * 1.03
@@ -63,7 +63,7 @@ def test_a_gap_that_only_the_blocks_have_is_not_gone_through() -> None:
     cost = np.ones((120, 120), np.float32)
     cost[60] = -1  # One cell thick: every block of it has free cells.
     cost[60, 110:] = 1
-    way = GridSearch(cost).way((10, 10), (110, 10))
+    way = GridSearch(cost).path((10, 10), (110, 10))
     assert price(cost, way) == pytest.approx(reference(cost, (10, 10), (110, 10)))
 
 
@@ -71,23 +71,23 @@ def test_where_there_is_no_way_it_says_so() -> None:
     cost = np.ones((120, 120), np.float32)
     cost[60] = -1
     with pytest.raises(ValueError, match=r'.'):
-        GridSearch(cost).way((10, 10), (110, 10))
+        GridSearch(cost).path((10, 10), (110, 10))
 
 
 def test_a_way_does_not_leave_the_map_on_one_side_and_enter_it_on_the_other() -> None:
     cost = np.ones((120, 120), np.float32)
     cost[:, 40:80] = -1
     with pytest.raises(ValueError, match=r'.'):
-        GridSearch(cost).way((10, 10), (10, 110))
+        GridSearch(cost).path((10, 10), (10, 110))
 
 
 def test_costs_that_changed_are_searched_once_it_is_told() -> None:
     cost = np.ones((200, 200), np.float32)
     search = GridSearch(cost)
-    straight = search.way((100, 5), (100, 195))
+    straight = search.path((100, 5), (100, 195))
     cost[90:111, 80:121] = -1
     search.changed(90, 111, 80, 121)
-    around = search.way((100, 5), (100, 195))
+    around = search.path((100, 5), (100, 195))
     assert (straight[:, 0] == 100).all()
     assert price(cost, around) == pytest.approx(reference(cost, (100, 5), (100, 195)), rel=0.01)
 

@@ -12,8 +12,8 @@ from lidar_navigation.driving.sampled_planning import (
     SampledPlanner,
     _standing,
     is_safe,
+    path_cost,
     price_of_effort,
-    price_of_way,
     rolled_out,
 )
 from lidar_navigation.geometry import composed, relative
@@ -127,7 +127,7 @@ LONG = np.stack([np.arange(0.0, 3.05, 0.1), np.zeros(31)], axis=1)
 def test_the_price_of_a_way_is_what_is_left_and_how_far_it_leaves_the_path(
     poses: np.ndarray, price: float
 ) -> None:
-    assert price_of_way(poses[None], LONG) == pytest.approx([price], abs=1e-5)
+    assert path_cost(poses[None], LONG) == pytest.approx([price], abs=1e-5)
 
 
 def test_what_leaves_the_path_at_the_end_pays_for_where_it_ends() -> None:
@@ -135,7 +135,7 @@ def test_what_leaves_the_path_at_the_end_pays_for_where_it_ends() -> None:
     poses[-1, 1] = poses[-2, 1] = 0.3
     # At the last moment that is looked at it is 0.3 m off; that counts once and four times more.
     left = 1.0 + 0.3 + 0.3 * math.hypot(1.0, 0.3)
-    assert price_of_way(poses[None], LONG) == pytest.approx([0.3 + 4 * left], abs=1e-5)
+    assert path_cost(poses[None], LONG) == pytest.approx([0.3 + 4 * left], abs=1e-5)
 
 
 def test_beyond_the_end_of_a_path_one_looks_along_its_last_step() -> None:
@@ -143,7 +143,7 @@ def test_beyond_the_end_of_a_path_one_looks_along_its_last_step() -> None:
     there = np.tile(np.array([1.0, 0.5, math.pi / 2], np.float32), (20, 1))
     askew = there.copy()
     askew[-1, 2] = 0.0
-    assert price_of_way(np.stack([there, askew]), bent) == pytest.approx([0.0, 1.0], abs=1e-5)
+    assert path_cost(np.stack([there, askew]), bent) == pytest.approx([0.0, 1.0], abs=1e-5)
 
 
 def test_backwards_and_rough_is_dear() -> None:

@@ -306,7 +306,7 @@ RATE_CHANGE = 0.1
 """Rates of the battery that differ by less than this part keep the plan."""
 
 
-def way_home(graph: PatrolGraph, place: str, stations: Sequence[str]) -> float:
+def seconds_to_station(graph: PatrolGraph, place: str, stations: Sequence[str]) -> float:
     """Return the seconds of driving from ``place`` to the nearest charging place; inf: none."""
     seconds, _ = graph.drive_home([each for each in stations if each in graph.index])
     return seconds[graph.index[place]]

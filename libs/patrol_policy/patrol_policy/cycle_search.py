@@ -271,14 +271,14 @@ class CycleSearch:
     @property
     def finished(self) -> bool:
         """Whether a better cycle is not looked for: none can be, or very much was tried."""
-        # Below `least_round` no lawful cycle is known to fall; a little above it, further work
+        # Below `least_cycle` no lawful cycle is known to fall; a little above it, further work
         # would gain less than drives differ from what is expected of them.
         best = self.best
         if self.work > ALL_WORK or len(best.targets) < 4:
             return True
         if best.breaches or best.short > 0.0:
             return False
-        return self.cost(best) <= GOOD_ENOUGH * self._rules.least_round
+        return self.cost(best) <= GOOD_ENOUGH * self._rules.least_cycle
 
     def improve(self, work: float) -> None:
         """Search on."""

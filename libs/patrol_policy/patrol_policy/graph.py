@@ -57,8 +57,8 @@ class PatrolGraph:
     own_exploration: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for place, ways in self.leg_seconds.items():
-            for other, seconds in ways.items():
+        for place, edges in self.leg_seconds.items():
+            for other, seconds in edges.items():
                 if other not in self.leg_seconds:
                     raise GraphError(f'{place} leads to {other}, which is not a place of the map')
                 if not seconds + self.exploring(other) > 0.0 or not math.isfinite(seconds):
@@ -81,7 +81,7 @@ class PatrolGraph:
         return {place: position for position, place in enumerate(self.places)}
 
     @cached_property
-    def ways(self) -> list[dict[int, float]]:
+    def edges(self) -> list[dict[int, float]]:
         """For each place, the seconds to each neighbour, exploring there included, by index."""
         index = self.index
         return [
@@ -128,8 +128,10 @@ class PatrolGraph:
     @cached_property
     def cheapest_entries(self) -> float:
         """Seconds for entering each place once from its nearest neighbour: no tour is shorter."""
-        ways = self.ways
-        entries = (min((ways[o][p] for o in others), default=0.0) for p, others in enumerate(ways))
+        edges = self.edges
+        entries = (
+            min((edges[o][p] for o in others), default=0.0) for p, others in enumerate(edges)
+        )
         return sum(entries)
 
     @cached_property
@@ -138,9 +140,9 @@ class PatrolGraph:
         from scipy.sparse import csr_array
 
         count = len(self.places)
-        rows = np.repeat(np.arange(count), [len(others) for others in self.ways])
-        columns = np.array([o for others in self.ways for o in others], dtype=np.intp)
-        values = np.array([s for others in self.ways for s in others.values()])
+        rows = np.repeat(np.arange(count), [len(others) for others in self.edges])
+        columns = np.array([o for others in self.edges for o in others], dtype=np.intp)
+        values = np.array([s for others in self.edges for s in others.values()])
         return csr_array((values, (rows, columns)), shape=(count, count))
 
     @cached_property
@@ -156,7 +158,7 @@ class PatrolGraph:
             return found
         count = len(self.places)
         seconds = np.full((count, count), np.inf)
-        for place, others in enumerate(self.ways):
+        for place, others in enumerate(self.edges):
             seconds[place, list(others)] = list(others.values())
         np.fill_diagonal(seconds, 0.0)
         for middle in range(count):
@@ -243,8 +245,8 @@ class PatrolGraph:
         """Return the map without all places but ``kept``."""
         names = set(kept)
         legs = {
-            place: {other: cost for other, cost in ways.items() if other in names}
-            for place, ways in self.leg_seconds.items()
+            place: {other: cost for other, cost in edges.items() if other in names}
+            for place, edges in self.leg_seconds.items()
             if place in names
         }
         return PatrolGraph(legs, self.exploration_seconds, self.own_exploration)
@@ -253,8 +255,8 @@ class PatrolGraph:
         """Return the map without the direct way between two places."""
         gone = {(start, goal), (goal, start)}
         legs = {
-            place: {other: cost for other, cost in ways.items() if (place, other) not in gone}
-            for place, ways in self.leg_seconds.items()
+            place: {other: cost for other, cost in edges.items() if (place, other) not in gone}
+            for place, edges in self.leg_seconds.items()
         }
         return PatrolGraph(legs, self.exploration_seconds, self.own_exploration)
 
@@ -269,7 +271,7 @@ class PatrolGraph:
             raise GraphError('no tour leads through all places: the map is not connected')
         if len(self.places) <= EXACT_UP_TO:
             return shortest_tour(self.distances)
-        return tour_over_blocks(self.ways, biconnected_blocks(self.ways))
+        return tour_over_blocks(self.edges, biconnected_blocks(self.edges))
 
     @cached_property
     def walk(self) -> tuple[str, ...]:
@@ -283,23 +285,23 @@ class PatrolGraph:
         return tuple(steps)
 
 
-def biconnected_blocks(ways: Sequence[Iterable[int]]) -> list[list[int]]:
+def biconnected_blocks(edges: Sequence[Iterable[int]]) -> list[list[int]]:
     """Return the blocks of a graph: places that stay connected whichever of them is taken away.
 
     By one depth-first walk (Hopcroft and Tarjan, Algorithm 447, Communications of the ACM, 1973).
 
     Args:
-        ways: Where a way leads from each place; its direction does not count.
+        edges: Where a way leads from each place; its direction does not count.
     """
-    joined: list[set[int]] = [set() for _ in ways]
-    for place, others in enumerate(ways):
+    joined: list[set[int]] = [set() for _ in edges]
+    for place, others in enumerate(edges):
         for other in others:
             joined[place].add(other)
             joined[other].add(place)
     number: dict[int, int] = {}
     lowest: dict[int, int] = {}
     blocks = []
-    for root in range(len(ways)):
+    for root in range(len(edges)):
         if root in number:
             continue
         number[root] = lowest[root] = len(number)

@@ -231,7 +231,7 @@ class Planner:
             and all(
                 abs(now[other] - seconds) <= LEG_CHANGE * seconds for other, seconds in then.items()
             )
-            for now, then in zip(graph.ways, planned.ways, strict=True)
+            for now, then in zip(graph.edges, planned.edges, strict=True)
         )
 
     def for_a_question(self) -> Planner:

@@ -67,7 +67,7 @@ class RuleGraph:
             self.slack[place] = math.inf
         stations = energy.stations if energy else []
         self.places = [*range(count), *stations]
-        self.leg_seconds = [*graph.ways, *(graph.ways[station] for station in stations)]
+        self.leg_seconds = [*graph.edges, *(graph.edges[station] for station in stations)]
         self.slack += [0.0] * len(stations)
         self.away: Sequence[Mapping[int, float] | Sequence[float]]
         if graph.has_all_pairs:
@@ -75,7 +75,7 @@ class RuleGraph:
             self._hops: dict[tuple[int, int], int] = {}
             self.away = self._seconds_away()
         else:
-            self.away = [_FoundWays(self, stop) for stop in range(len(self.places))]
+            self.away = [_FoundPaths(self, stop) for stop in range(len(self.places))]
         self._paths: dict[tuple[int, int], list[int]] = {}
         self._near: dict[int, list[int]] = {}
 
@@ -237,7 +237,7 @@ class RuleGraph:
         return max((p - self.slack[place] for place, p in self.held_periods.items()), default=0.0)
 
     @cached_property
-    def least_round(self) -> float:
+    def least_cycle(self) -> float:
         """Seconds that no lawful round is known to fall below."""
         if self.energy is not None or not self.is_even:
             return self.least_wait
@@ -382,7 +382,7 @@ class RuleGraph:
         return arrived
 
 
-class _FoundWays(dict[int, float]):
+class _FoundPaths(dict[int, float]):
     """Seconds from one stop of a large map to others, found when they are first asked for."""
 
     def __init__(self, rules: RuleGraph, stop: int) -> None:

@@ -84,7 +84,7 @@ def shortest_tour(distances: Matrix) -> Tour:
     return Tour(order, length, lambda: _one_tree_bound(np.minimum(distances, distances.T), length))
 
 
-def tour_over_blocks(ways: Sequence[Mapping[int, float]], blocks: Iterable[Sequence[int]]) -> Tour:
+def tour_over_blocks(edges: Sequence[Mapping[int, float]], blocks: Iterable[Sequence[int]]) -> Tour:
     """Return the tour of a map from the tours of its biconnected blocks.
 
     A closed walk through the whole map passes from block to block only at the places they share,
@@ -92,14 +92,14 @@ def tour_over_blocks(ways: Sequence[Mapping[int, float]], blocks: Iterable[Seque
     way between two places of a block does not leave it, so each block is looked at alone.
 
     Args:
-        ways: For each place, the seconds to each neighbour.
+        edges: For each place, the seconds to each neighbour.
         blocks: The biconnected components of the map, as indices.
     """
     rings: list[list[int]] = []
     at: dict[int, list[int]] = {}
     tours = []
     for members in blocks:
-        tour = _tour_of_block(ways, members)
+        tour = _tour_of_block(edges, members)
         tours.append(tour)
         for place in members:
             at.setdefault(place, []).append(len(rings))
@@ -111,14 +111,14 @@ def tour_over_blocks(ways: Sequence[Mapping[int, float]], blocks: Iterable[Seque
     return Tour(order, length, lambda: sum(tour.bound for tour in tours))
 
 
-def _tour_of_block(ways: Sequence[Mapping[int, float]], members: Sequence[int]) -> Tour:
+def _tour_of_block(edges: Sequence[Mapping[int, float]], members: Sequence[int]) -> Tour:
     """Return the tour of one block; its order counts from 0."""
     if len(members) == 2:
         first, second = members
-        return Tour((0, 1), ways[first][second] + ways[second][first])
+        return Tour((0, 1), edges[first][second] + edges[second][first])
     row_of = {place: row for row, place in enumerate(members)}
     inner = [
-        {row_of[other]: seconds for other, seconds in ways[place].items() if other in row_of}
+        {row_of[other]: seconds for other, seconds in edges[place].items() if other in row_of}
         for place in members
     ]
     if len(members) > DENSE_BLOCK_UP_TO:
@@ -144,22 +144,22 @@ class _LocalDistances(dict[int, float]):
     there is looked at, and memory grows with the places times their surroundings.
     """
 
-    def __init__(self, rows: list[_LocalDistances], ways: list[dict[int, float]], place: int):
-        self._rows, self._ways, self._place = rows, ways, place
+    def __init__(self, rows: list[_LocalDistances], edges: list[dict[int, float]], place: int):
+        self._rows, self._edges, self._place = rows, edges, place
 
     def __missing__(self, goal: int) -> float:
         return self.find(goal, LOCAL_REACH)
 
     def find(self, goal: int, reach: float) -> float:
         """Search a way over at most so many places, and keep what that found."""
-        nearest = _nearest_first(self._ways, self._place, reach)
+        nearest = _nearest_first(self._edges, self._place, reach)
         seconds = next((found for place, found in nearest if place == goal), math.inf)
         self[goal] = self._rows[goal][self._place] = seconds
         return seconds
 
 
 def _nearest_first(
-    ways: Sequence[Mapping[int, float]], start: int, reach: float
+    edges: Sequence[Mapping[int, float]], start: int, reach: float
 ) -> Iterator[tuple[int, float]]:
     """Yield places by rising distance from one, at most ``reach`` of them (Dijkstra)."""
     pending, done = [(0.0, start)], set[int]()
@@ -169,12 +169,12 @@ def _nearest_first(
             continue
         done.add(place)
         yield place, seconds
-        for other, leg in ways[place].items():
+        for other, leg in edges[place].items():
             if other not in done:
                 heapq.heappush(pending, (seconds + leg, other))
 
 
-def _tour_of_large_block(ways: list[dict[int, float]]) -> Tour:
+def _tour_of_large_block(edges: list[dict[int, float]]) -> Tour:
     """Return a good tour of a block for which all distances would not fit into memory.
 
     It begins with the order in which a depth-first walk meets the places of the minimum spanning
@@ -183,10 +183,10 @@ def _tour_of_large_block(ways: list[dict[int, float]]) -> Tour:
     """
     import networkx
 
-    count = len(ways)
+    count = len(edges)
     mean = [
-        {other: (seconds + ways[other][place]) / 2.0 for other, seconds in others.items()}
-        for place, others in enumerate(ways)
+        {other: (seconds + edges[other][place]) / 2.0 for other, seconds in others.items()}
+        for place, others in enumerate(edges)
     ]
     network: networkx.Graph[int] = networkx.Graph()
     network.add_weighted_edges_from(

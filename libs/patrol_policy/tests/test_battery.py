@@ -15,7 +15,7 @@ from patrol_policy.battery import (
     Charger,
     Draw,
     Energy,
-    way_home,
+    seconds_to_station,
 )
 from patrol_policy.decision import RECHARGE
 from patrol_policy.graph import PatrolGraph
@@ -162,11 +162,11 @@ def test_a_place_is_within_range_while_a_full_charge_leaves_what_it_must() -> No
             out, home = energy.out_seconds[at], energy.home_seconds[at]
             assert energy.within_range[at] == energy.suffices(out, home)
             assert energy.least[at] == max(10.0, Draw(rate).most(home, 0.1) + 5.0)
-            assert home == way_home(graph, place, ['E', 'NOWHERE'])
+            assert home == seconds_to_station(graph, place, ['E', 'NOWHERE'])
     only = Energy(PatrolGraph({'A': {}, 'B': {}}), [Charger('A')], Draw(0.1), 0.0, BatteryLimits())
     assert (only.home, only.within_range) == ([0, -1], [True, False])
     assert math.isinf(only.least[1])
-    assert math.isinf(way_home(PatrolGraph({'A': {}, 'B': {}}), 'A', ['B']))
+    assert math.isinf(seconds_to_station(PatrolGraph({'A': {}, 'B': {}}), 'A', ['B']))
 
 
 def test_battery_limits_out_of_order_are_named() -> None:

@@ -26,7 +26,7 @@ def walks(graph: PatrolGraph, most: int) -> Iterator[list[int]]:
         if len(walk) > 1 and walk[-1] == 0 and len(set(walk)) == len(graph.places):
             yield walk[1:]
         if len(walk) <= most:
-            for other in graph.ways[walk[-1]]:
+            for other in graph.edges[walk[-1]]:
                 yield from onward([*walk, other])
 
     yield from onward([0])
@@ -39,7 +39,7 @@ def lawful_wait(graph: PatrolGraph, walk: list[int], threshold: float, ranks: li
     for lap in range(3):
         longest = 0.0
         for stop in walk:
-            ways = graph.ways[place]
+            ways = graph.edges[place]
             ranked = {o: 0 if now - seen[o] > threshold else ranks[o] for o in ways}
             if lap and ranked[stop] != min(ranked.values()):
                 return math.inf

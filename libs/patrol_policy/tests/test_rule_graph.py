@@ -362,9 +362,9 @@ def test_ends_of_corridors_are_held_until_they_are_urgent() -> None:
     assert rule_graph_of(graph, 50.0, [2, 1, 1, 1], 0).gates == [1, -1, -1, -1]
     assert rule_graph_of(graph, 50.0, [1, 1, 1, 1], 0).gates == [-1] * 4
     even = rule_graph_of(graph, 50.0, [1, 1, 1, 1], 0)
-    assert (even.least_period, even.least_wait, even.least_round) == (0.0, 0.0, graph.tour.length)
+    assert (even.least_period, even.least_wait, even.least_cycle) == (0.0, 0.0, graph.tour.length)
     held = rule_graph_of(graph, 50.0, default_ranks(graph), 0)
-    assert held.least_round == held.least_period == held.least_wait
+    assert held.least_cycle == held.least_period == held.least_wait
     # The place with the longest period has more time.
     later = rule_graph_of(graph, 50.0, default_ranks(graph), 0, {0: 70.0})
     assert later.least_period == pytest.approx(77.0, abs=0.01)

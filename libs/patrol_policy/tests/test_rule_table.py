@@ -138,7 +138,7 @@ def test_all_who_ask_what_comes_first_are_told_the_same(known: Situation) -> Non
     overdue = {place: waits[place] > free.threshold_of(place) for place in graph.places}
     lawful = {index[place] for place in in_plain_words(free, here, overdue)}
     ages = tuple(round(1000.0 * waits[place]) for place in graph.places)
-    legs = dict.fromkeys(graph.ways[index[here]], 1)
+    legs = dict.fromkeys(graph.edges[index[here]], 1)
     everywhere = (1 << len(graph.places)) - 1
     for met, compare in ((everywhere, set.__eq__), (0, set.__ge__)):
         moves = possible_moves(free.table, legs, (index[here], met, ages))
@@ -163,7 +163,7 @@ def test_a_round_breaks_the_rules_where_a_robot_that_walks_it_would(
     graph, rules = free.graph, rule_graph(free)
     walk = [0]
     for _ in range(data.draw(st.integers(1, 12))):
-        walk.append(data.draw(st.sampled_from(sorted(graph.ways[walk[-1]]))))
+        walk.append(data.draw(st.sampled_from(sorted(graph.edges[walk[-1]]))))
     walk += [graph.index[name] for name in graph.route(graph.places[walk[-1]], graph.places[0])]
     targets = tuple(walk[1:])
     missing = set(range(rules.count)) - set(targets)

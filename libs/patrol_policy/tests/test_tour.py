@@ -365,7 +365,7 @@ KNOWN_LENGTHS = (439.325, 409.235, 456.086, 506.082, 558.532, 564.345)
 
 def test_places_come_nearest_first_as_far_as_is_asked() -> None:
     graph = hall(5, 4, 1)
-    ways = graph.ways
+    ways = graph.edges
     for start, reach in itertools.product((0, 7, 19), (1, 5, 20, 99)):
         found = list(_nearest_first(ways, start, reach))
         seconds = [graph.distances[start][place] for place, _ in found]

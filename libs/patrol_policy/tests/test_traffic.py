@@ -201,8 +201,8 @@ def test_on_random_trees_everybody_reaches_every_goal(seed: int) -> None:
             told = right_of_way([intention(each) for each in names], name, neighbours, layout)
             if told.go and told.place != at[name]:
                 moving[name] = (told.place, now + rng.randrange(1, 6))
-        ways = [frozenset((at[name], to)) for name, (to, _) in moving.items()]
-        assert len(ways) == len(set(ways)), 'two on one narrow way'
+        passages = [frozenset((at[name], to)) for name, (to, _) in moving.items()]
+        assert len(passages) == len(set(passages)), 'two on one narrow way'
         narrow = [at[name] for name in names if at[name] not in wide]
         assert len(narrow) == len(set(narrow)), 'two in one narrow place'
     assert min(reached.values()) > 20

@@ -108,7 +108,7 @@ WORDS = {
 PEER_PERIOD = 0.2
 """Seconds between two looks whether a peer that was away has come back."""
 
-WAY_PERIOD = 1.0
+PASSAGE_PERIOD = 1.0
 """Seconds between two questions to the ontology whether a way has opened."""
 
 
@@ -147,7 +147,7 @@ class WaitForHelp(MachineState):
             f'{reason} (in {mission.place or "an unknown place"}, {mission.battery.level_text()}); '
             f'{_what_helps(failure, mission.place)}; next try in {seconds:g} s'
         )
-        is_over, period = mission.watch_ways(interrupt), WAY_PERIOD
+        is_over, period = mission.watch_passages(interrupt), PASSAGE_PERIOD
         if failure is not None and failure.is_over is not None:
             is_over, period = failure.is_over, PEER_PERIOD
         if not self._wait(seconds, is_over, period):

@@ -193,7 +193,7 @@ def _stops(mission: Mission, place: str, goal: Point, interrupt: fsm.Interrupt) 
     before = mission.place
     if mission.recovery.tries(place) < max(1, mission.settings.recovery.path_tries - 1):
         return [goal]
-    way = mission.ports.reasoner.route_round(before, place)
+    way = mission.ports.reasoner.detour(before, place)
     if not way:
         return [goal]
     mission.say(f'trying the way round: {" - ".join((before, *way))}')

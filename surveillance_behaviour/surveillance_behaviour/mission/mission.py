@@ -209,14 +209,14 @@ class Mission:
             self.dock.strayed()
             self.note('visit', place=here, distance=0.0)
 
-    def watch_ways(self, interrupt: Interrupt) -> Callable[[], bool]:
+    def watch_passages(self, interrupt: Interrupt) -> Callable[[], bool]:
         """Return a look whether a place can be reached that could not be at the first look.
 
         An ontology that does not answer tells nothing.
         """
         known: frozenset[str] | None = None
 
-        def way_opened() -> bool:
+        def passage_opened() -> bool:
             nonlocal known
             try:
                 reachable = self.ports.ontology.reachable(interrupt)
@@ -225,7 +225,7 @@ class Mission:
             known = reachable if known is None else known
             return not reachable <= known
 
-        return way_opened
+        return passage_opened
 
     def goal(self, place: str, interrupt: Interrupt) -> tuple[str, Point]:
         """Return where a drive to a place ends, as a name and as a point.

@@ -119,6 +119,6 @@ class ReasonClient(Reasoner):
         battery = self._battery
         return f'the battery is low ({battery.level_text()})' if battery.low else ''
 
-    def route_round(self, start: str, goal: str) -> tuple[str, ...]:
+    def detour(self, start: str, goal: str) -> tuple[str, ...]:
         """Return nothing: the planner of `motion/planner` goes round by itself."""
         return ()

@@ -14,8 +14,8 @@ from indoor_watch.day_book import DayBook
 from indoor_watch.doors import Segment
 from indoor_watch.inspection_plan import InspectionPlan
 from indoor_watch.other_robots import OtherRobots
+from indoor_watch.passages import Passages
 from indoor_watch.privacy import blurred_at_rest
-from indoor_watch.ways import Ways
 from lidar_navigation import PlaceLocator
 from strict_files.files import KeptFile
 from surveillance_perception.finding_teller import FindingTeller
@@ -78,7 +78,7 @@ class ObserverWorker:
             doors=doors,
             markers=settings.known_markers(),
             rooms=self._rooms,
-            ways_of=lambda grid: Ways(grid, settings.radius, doors, points),
+            passages_of=lambda grid: Passages(grid, settings.radius, doors, points),
             find_persons=settings.person_finder(self._complain),
             covered=topics.coverage,
             store=self._store,

@@ -60,7 +60,7 @@ class People:
     def __init__(self, plan: FloorPlan, model: PeopleModel, rng: np.random.Generator) -> None:
         self._model = model
         self._rng = rng
-        self._ways = _Ways(plan, model.radius + _WALL_GAP)
+        self._paths = _WalkingPaths(plan, model.radius + _WALL_GAP)
         self._goals = list(plan.place.positions)
         self._people = [self._new(plan.start[:2]) for _ in range(model.count)]
 
@@ -86,7 +86,7 @@ class People:
             if person.rest > 0:
                 continue
             self._walk(person, dt, robots, robot_radius)
-            left = self._ways.left(person.goal, person.at)
+            left = self._paths.left(person.goal, person.at)
             person.held_up = 0.0 if left < person.nearest else person.held_up + dt
             person.nearest = min(person.nearest, left)
             if left < person.stop_before:
@@ -100,7 +100,7 @@ class People:
     ) -> None:
         """Take one step, if there is room for it."""
         model = self._model
-        ahead = self._ways.direction(person.goal, person.at)
+        ahead = self._paths.direction(person.goal, person.at)
         reach = model.radius + robot_radius + _KEPT_GAP[model.manner]
         before = [math.dist(person.at, robot) for robot in robots]
         for turn in _SIDESTEPS:
@@ -111,7 +111,7 @@ class People:
                 for robot, was in zip(robots, before, strict=True)
             ):
                 continue
-            if self._ways.is_free((x, y)):
+            if self._paths.is_free((x, y)):
                 person.at, person.ahead = (x, y), ahead + turn
                 return
 
@@ -123,9 +123,9 @@ class People:
         person.nearest, person.held_up = math.inf, 0.0
 
     def _new(self, robot: Point) -> _Person:
-        starts = [goal for goal in self._goals if math.dist(self._ways.point(goal), robot) > 1.5]
+        starts = [goal for goal in self._goals if math.dist(self._paths.point(goal), robot) > 1.5]
         start = starts[int(self._rng.integers(len(starts)))]
-        person = _Person(self._ways.point(start), start)
+        person = _Person(self._paths.point(start), start)
         self._turn(person)
         return person
 
@@ -166,7 +166,7 @@ class _Route:
     ahead: npt.NDArray[np.intp]
 
 
-class _Ways:
+class _WalkingPaths:
     """The shortest ways to each room."""
 
     def __init__(self, plan: FloorPlan, reach: float) -> None:

@@ -280,18 +280,18 @@ def take_part(draft: Draft, x: float, y: float) -> str:
         there = regions.room_at(x, y) or 'no part of the floor'
         raise ValueError(f'({x:.2f}, {y:.2f}) lies in {there}: expected a part that is no room')
     part = parts[0]
-    if not part.ways:
+    if not part.gaps:
         raise ValueError(f'{part.reason(draft.plan)}: the robot cannot get in from any room')
     point = free_point(grid, part.cells, draft.radius)
     room = _next_name('R', _names(draft))
     doors: list[str] = []
-    for wall_name, beside in part.ways.items():
+    for wall_name, beside in part.gaps.items():
         wall = draft.plan.walls[wall_name]
         (x1, y1), (x2, y2) = wall.start, wall.end
         name = _next_name('D', {*_names(draft), *doors})
         yaw = math.atan2(y2 - y1, x2 - x1)
         door = Door(name, (x1 + x2) / 2, (y1 + y2) / 2, yaw, wall.length)
-        if door.width <= 2 * draft.radius and len(part.ways) > 1:
+        if door.width <= 2 * draft.radius and len(part.gaps) > 1:
             continue  # another way is wider
         del draft.table('walls')[wall_name]
         draft.table('doors')[name] = _row(door)

@@ -148,7 +148,7 @@ class SampledPlanner:
         return (
             self._of_standing(poses, controls, away)
             + self._of_moving(poses, controls, movers)
-            + price_of_way(poses, path)
+            + path_cost(poses, path)
             + price_of_effort(controls)
         )
 
@@ -248,7 +248,7 @@ class SampledPlanner:
         return price
 
 
-def price_of_way(poses: Floats, path: Points) -> Floats:
+def path_cost(poses: Floats, path: Points) -> Floats:
     """Return what leaving the path costs, less what getting on along it is worth.
 
     Args:

@@ -54,14 +54,14 @@ class Frontier:
         points: Centres of its cells, shape (n, 2), metres.
         length: Metres.
         viewpoint: From where the robot can look over it, shape (2,); None: it cannot get there.
-        way: The length of the way there, longer where it is narrow, metres.
+        path_length: The length of the way there, longer where it is narrow, metres.
         worth: What counts when the next one is chosen; the least is the best, metres.
     """
 
     points: Points
     length: float
     viewpoint: Points | None
-    way: float
+    path_length: float
     worth: float
 
     @property
@@ -135,10 +135,14 @@ def find_frontiers(
         central = own[off <= max(0.5 * p.middle * length, float(off.min()) + side)]
         best = central[np.argmin(dear[central])]
         x, y = grid.centre_of(*standable[best].tolist())
-        way = float(ways[at][best])
+        path_length = float(ways[at][best])
         turn = abs(angle_between(pose[2], math.atan2(y - pose[1], x - pose[0])))
-        worth = way + p.turning * turn * (way > p.spent) - p.gain * min(length, p.most_gain)
-        found.append(Frontier(grid.centres_of(part), length, np.array([x, y]), way, worth))
+        worth = (
+            path_length
+            + p.turning * turn * (path_length > p.spent)
+            - p.gain * min(length, p.most_gain)
+        )
+        found.append(Frontier(grid.centres_of(part), length, np.array([x, y]), path_length, worth))
     return sorted(found, key=lambda each: each.worth)
 
 
@@ -179,5 +183,5 @@ def _in_sight(
         return np.zeros(0, np.bool_)
     steps = 2 * int(np.abs(others - cells).max()) + 2
     share = np.linspace(0.0, 1.0, steps)[:, None, None]
-    way = np.rint((1 - share) * cells + share * others).astype(np.intp)
-    return np.asarray(~occupied[way[..., 0], way[..., 1]].any(axis=0))
+    path_length = np.rint((1 - share) * cells + share * others).astype(np.intp)
+    return np.asarray(~occupied[path_length[..., 0], path_length[..., 1]].any(axis=0))

@@ -229,7 +229,7 @@ class GridPlanner:
 
     def _found(self, begin: Points, end: Points, start_cell: Cell, goal_cell: Cell) -> Points:
         """Return the cheapest path between two points whose cells these are."""
-        cells = self._search.way(start_cell, goal_cell)
+        cells = self._search.path(start_cell, goal_cell)
         path = self.grid.centres_of(cells)
         path[0] = begin if self._is_free_at(begin) else path[0]
         path[-1] = end

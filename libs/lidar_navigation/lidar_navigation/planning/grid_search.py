@@ -70,7 +70,7 @@ class GridSearch:
             counts > 0, sums / np.maximum(counts, 1), -1
         )
 
-    def way(self, start: Cell, goal: Cell) -> Cells:
+    def path(self, start: Cell, goal: Cell) -> Cells:
         """Return the cells of the cheapest way, shape (n, 2), both ends included.
 
         Raises:

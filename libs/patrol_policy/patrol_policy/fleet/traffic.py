@@ -50,16 +50,16 @@ class Layout:
 
     Attributes:
         places: Wide places.
-        ways: Wide ways, each as a pair of places.
+        passages: Wide ways, each as a pair of places.
     """
 
     places: frozenset[str] = frozenset()
-    ways: frozenset[frozenset[str]] = frozenset()
+    passages: frozenset[frozenset[str]] = frozenset()
 
     @classmethod
-    def of(cls, places: Iterable[str], ways: Iterable[str]) -> Layout:
+    def of(cls, places: Iterable[str], passages: Iterable[str]) -> Layout:
         """Return the layout of names of places and of ways written as `A B`."""
-        return cls(frozenset(places), frozenset(frozenset(way.split()) for way in ways))
+        return cls(frozenset(places), frozenset(frozenset(passage.split()) for passage in passages))
 
 
 @dataclass(frozen=True)
@@ -139,12 +139,12 @@ def right_of_way(
     others = [each for each in intentions if each.robot != robot]
     if not me.heading_to:
         return _stay(me, others, traffic)
-    way = frozenset((me.place, me.heading_to))
+    passage = frozenset((me.place, me.heading_to))
     name = f'the way {me.place} - {me.heading_to}'
     entered, here = traffic.blocks.get(me.heading_to), traffic.blocks.get(me.place)
     for other in sorted(others, key=lambda each: (each.since, each.robot)):
         theirs = frozenset((other.place, other.heading_to))
-        if way not in layout.ways and theirs == way:
+        if passage not in layout.passages and theirs == passage:
             if other.is_moving:
                 return RightOfWay(False, me.heading_to, f'{other.robot} is on {name}', other.robot)
             if other.heading_to and not other.is_fixed and _is_first(other, me, others, traffic):
@@ -201,7 +201,7 @@ def may_be_contested(
         return False
     blocks = _Traffic(neighbours, layout).blocks
     ends = (me.place, me.heading_to)
-    is_narrow = frozenset(ends) not in layout.ways
+    is_narrow = frozenset(ends) not in layout.passages
     entered = blocks.get(me.heading_to)
     for other in intentions:
         if other.robot == robot:

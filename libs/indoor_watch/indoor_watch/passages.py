@@ -1,8 +1,8 @@
-"""Whether the ways of the map are free: from each place's point to each of its doors, and through.
+"""Whether the passages of the map are free: from each place's point to its doors, and through.
 
 Cells nearer to a wall than the robot's radius are not passable; things that stand about take more
-of them. A way is looked at within its room, cut off at the doors: a detour through other rooms is
-another way. What the map alone does not allow is no way that could be blocked.
+of them. A passage is looked at within its room, cut off at the doors: a detour through other rooms
+is another passage. What the map alone does not allow is no passage that could be blocked.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ Mask = NDArray[np.bool_]
 AROUND_DOOR = 1.2
 """A doorway is looked at within this distance, metres."""
 SNAP = 0.6
-"""A way begins at the passable cell nearest to its point, up to here, metres."""
+"""A passage begins at the passable cell nearest to its point, up to here, metres."""
 _WITH_CORNERS = np.ones((3, 3), np.bool_)
 
 
 @dataclass(frozen=True)
-class BlockedWay:
-    """A way that things block.
+class BlockedPassage:
+    """A passage that things block.
 
     Attributes:
         door: The door that it leads to.
@@ -46,7 +46,7 @@ class BlockedWay:
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Passage:
     door: str
     place: str
     start: tuple[float, float]
@@ -60,8 +60,8 @@ class _Way:
         return slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
 
 
-class Ways:
-    """The ways of a map.
+class Passages:
+    """The passages of a map.
 
     Args:
         grid: The map with its doors open.
@@ -83,22 +83,22 @@ class Ways:
         self._passable = np.asarray(grid.free & (walls > radius), np.bool_)
         self._rooms, _ = ndimage.label(grid.free & ~drawn_lines(grid, list(doors.values())))
         rooms = self._rooms
-        ways = []
+        passages = []
         for door, segment in doors.items():
             sides = _sides(segment, radius + 0.25)
             middle = (segment[0] + segment[2]) / 2, (segment[1] + segment[3]) / 2
-            ways.append(_Way(door, '', *sides, self._near(middle, AROUND_DOOR)))
+            passages.append(_Passage(door, '', *sides, self._near(middle, AROUND_DOOR)))
             for side in sides:
                 room = grid.at(rooms, *side)
                 for place, point in points.items():
                     x, y = np.asarray(point, float)[:2].tolist()
                     xy = float(x), float(y)
                     if room and grid.at(rooms, *xy) == room:
-                        ways.append(_Way(door, place, xy, side, np.asarray(rooms == room)))
-        self._ways = [each for each in ways if self._is_free(self._passable, each)]
+                        passages.append(_Passage(door, place, xy, side, np.asarray(rooms == room)))
+        self._passages = [each for each in passages if self._is_free(self._passable, each)]
 
-    def blocked(self, things: Mask) -> list[BlockedWay]:
-        """Return the ways that things block.
+    def blocked(self, things: Mask) -> list[BlockedPassage]:
+        """Return the passages that things block.
 
         Args:
             things: The cells in which they stand, as the map's.
@@ -109,7 +109,7 @@ class Ways:
         passable = np.asarray(self._passable & (away > self._radius), np.bool_)
         rows, columns = np.nonzero(things)
         found = []
-        for each in self._ways:
+        for each in self._passages:
             if self._is_free(passable, each):
                 continue
             middle = (each.start[0] + each.end[0]) / 2, (each.start[1] + each.end[1]) / 2
@@ -120,13 +120,17 @@ class Ways:
             ]
             if spots:
                 at = min(spots, key=lambda spot: math.dist(spot, middle))
-                found.append(BlockedWay(each.door, each.place, (float(at[0]), float(at[1]))))
+                found.append(BlockedPassage(each.door, each.place, (float(at[0]), float(at[1]))))
         return found
 
-    def _is_free(self, passable: Mask, way: _Way) -> bool:
-        labels, _ = ndimage.label(passable[way.box] & way.within[way.box], _WITH_CORNERS)
-        corner = int(way.box[0].start), int(way.box[1].start)
-        first, second = (self._labels_at(labels, corner, each) for each in (way.start, way.end))
+    def _is_free(self, passable: Mask, passage: _Passage) -> bool:
+        labels, _ = ndimage.label(
+            passable[passage.box] & passage.within[passage.box], _WITH_CORNERS
+        )
+        corner = int(passage.box[0].start), int(passage.box[1].start)
+        first, second = (
+            self._labels_at(labels, corner, each) for each in (passage.start, passage.end)
+        )
         return bool(first & second)
 
     def _labels_at(
