@@ -34,6 +34,11 @@ def likely(habits: Habits, seen: Observation) -> float:
     return found
 
 
+def likely_or(habits: Habits, seen: Observation, unknown: float = 1.0) -> float:
+    found = habits.usual(seen)
+    return unknown if found is None else found
+
+
 def test_a_door_of_office_hours_is_unusual_when_it_is_open_at_night():
     habits = Habits()
     month_of_visits(habits)
@@ -73,10 +78,48 @@ def test_what_has_no_habit_is_never_unusual():
     assert 0.2 < min(found) <= max(found) < 0.8
 
 
-def test_nothing_is_said_after_a_few_visits_and_what_was_learned_outlives_a_restart():
+def test_what_changes_at_another_minute_each_day_is_not_unusual_there():
+    """A door is looked at four times a day, and each eighth day it is opened a little later."""
+    habits, called, number = Habits(), [], 0
+    for day in range(40):
+        for hour in (2, 8, 14, 20):
+            state = 'open' if hour == 14 or (hour == 8 and day % 8 != 6) else 'closed'
+            for minute in (0, 5, 10):
+                number += 1
+                seen = door(MONDAY + timedelta(days=day, hours=hour, minutes=minute), state)
+                usual = habits.usual(seen)
+                habits.learn(seen, number)
+                if usual is not None and usual < 0.1:
+                    called.append((day, hour))
+    assert called == []
+    night = door(MONDAY + timedelta(days=40, hours=2), 'open')
+    assert likely(habits, night) < 0.1
+
+
+def test_a_state_is_unusual_after_thirteen_days_however_often_a_day_it_is_looked_at():
+    for minutes in (60, 5):
+        habits, number = Habits(), 0
+        for day in range(13):
+            assert likely_or(habits, door(MONDAY + timedelta(days=day, hours=2), 'open')) >= 0.1
+            for minute in range(0, 24 * 60, minutes):
+                number += 1
+                moment = MONDAY + timedelta(days=day, minutes=minute)
+                habits.learn(door(moment, 'closed'), number)
+        assert likely(habits, door(MONDAY + timedelta(days=13, hours=2), 'open')) < 0.1
+
+
+def test_what_is_so_on_one_weekday_alone_is_usual_on_that_day():
+    habits = Habits()
+    for day in range(14 * 7):
+        moment = MONDAY + timedelta(days=day, hours=12)
+        habits.learn(door(moment, 'closed' if moment.weekday() == 6 else 'open'), day)
+    sunday, monday = (MONDAY + timedelta(days=each, hours=12) for each in (14 * 7 - 1, 14 * 7))
+    assert likely(habits, door(sunday, 'closed')) > 0.5
+    assert likely(habits, door(sunday, 'open')) < 0.1 > likely(habits, door(monday, 'closed'))
+
+
+def test_what_was_learned_outlives_a_restart():
     habits, again = Habits(), Habits()
-    for number in range(30):
-        habits.learn(door(MONDAY + timedelta(hours=number), 'closed'), number)
     assert habits.usual(door(MONDAY, 'open')) is None
     month_of_visits(habits)
     again.restore(json.loads(json.dumps(habits.state())))
