@@ -281,7 +281,8 @@ def test_a_pose_that_the_lidar_contradicts_is_told_of_and_no_visit_is_believed(
         for link in links:
             link.header.stamp = stamp
         frames.publish(TFMessage(transforms=links))
-        graph.until(lambda: motion._doubt._trace.is_past(stamp.sec + 1e-9 * stamp.nanosec))
+        seconds = stamp.sec + 1e-9 * stamp.nanosec
+        graph.until(lambda: motion._tf.tree.is_past('base_link', 'map', seconds))
 
     def seen_from(x: float) -> None:
         for _ in range(2):

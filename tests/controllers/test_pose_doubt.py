@@ -6,9 +6,8 @@ import secrets
 from typing import Any
 
 import numpy as np
-import pytest
 
-from surveillance_controllers.motion.pose_doubt import AFTER, PoseDoubt, PoseTrace
+from surveillance_controllers.motion.pose_doubt import AFTER, PoseDoubt
 
 
 def test_a_pose_in_the_wrong_room_comes_into_doubt_and_a_right_one_does_not(flat: Any) -> None:
@@ -41,18 +40,3 @@ def test_what_stands_around_the_robot_is_no_doubt(flat: Any) -> None:
     ]
     scan = flat.scan(pose, ring)
     assert not any(doubt.look(pose, scan, 1.0 * second) for second in range(20))
-
-
-def test_a_scan_is_seen_from_where_the_robot_was_then() -> None:
-    trace = PoseTrace()
-    for stamp, pose in ((1.0, (0.0, 0.0, 3.13)), (1.5, (1.0, 2.0, -3.13)), (2.5, (2.0, 2.0, -3.1))):
-        trace.add(stamp, pose)
-    assert trace.at(1.25) == (0.5, 1.0, pytest.approx(np.pi, abs=0.01))
-    assert trace.is_past(2.5)
-    assert not trace.is_past(2.6)
-    for unknown in (0.9, 2.0, 2.6):
-        assert trace.at(unknown) is None
-    trace.add(2.6, (2.0, 2.0, -2.0))
-    assert trace.at(2.55) is None, 'it turned too fast'
-    trace.add(1.0, (0.0, 0.0, 0.0))
-    assert trace.at(1.25) is None, 'the clock was set'

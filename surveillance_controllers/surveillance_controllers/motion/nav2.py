@@ -6,8 +6,8 @@ A path that only says where to turn (`spin_in_place`) becomes a Spin goal.
 
 Where the robot is, `map -> odom -> base` on `tf` says, else `amcl_pose`. Where no other program
 tells `amcl_pose` (slam_toolbox, RTAB-Map, Cartographer), this one does, from `tf`: planner, battery
-and page read it. From there its scans show which doors are shut. A pose that does not fit what the
-lidar sees is told of, and no visit is believed.
+and page read it. Where `tf` had the robot when a scan was made, the scan shows which doors are
+shut. A pose that does not fit what the lidar sees is told of, and no visit is believed.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ from surveillance_controllers.motion.nav2_goals import (
     reason_of,
 )
 from surveillance_controllers.motion.place_recording import PlaceRecorder
+from surveillance_controllers.motion.placed_scans import PlacedScans
 from surveillance_controllers.motion.pose_doubt import PoseDoubt
 from surveillance_controllers.motion.pose_reports import POSE
 from surveillance_runtime.conversions import (
@@ -92,10 +93,6 @@ STALLED = 90.0
 never answers, or a costmap does not clear. Nav2's own recoveries are through before."""
 MOVED = 0.25
 """It has moved when it is this far from where it was, metres."""
-
-MOST_TURN_RATE = 0.3
-"""Doors are read while the robot turns no faster, rad/s: `tf` says where it is a little later than
-the scan was made."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +185,10 @@ class Nav2Motion:
         self._places.set_positions(positions)
         knowledge.assume(positions)
         knowledge.follow_places(self._set_positions)
-        self._tf = FramesHeard(node)
+        self._tf = FramesHeard(node, news=lambda: self._scans.look())
+        self._scans = PlacedScans(
+            self._tf.tree, self._frames.base, self._frames.map, self._on_placed
+        )
         self._own_poses: Any = None
         self._doubt = PoseDoubt()
         StateSubscription(node, OccupancyGrid, 'map', self._on_map, owner='simulator')
@@ -200,7 +200,6 @@ class Nav2Motion:
             stamp=lambda told: seconds_of(told.header.stamp),
         )
         self._doors = DoorTeller(node, door_segments(node))
-        self._seen_from: tuple[Pose, float] | None = None
         lidar = ScanReader(node, node.declare_fields(_RadiusSetting()).radius, self._frames.base)
         lidar.subscribe(self._on_scan)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -322,8 +321,6 @@ class Nav2Motion:
             pose, stamp = found
             self._take(pose)
             self._publish(pose, stamp)
-            if (compared := self._doubt.take_pose(stamp, pose)) is not None:
-                self._tell_doubt(compared)
         if self._drive is not None:
             progress, stalled, run = self._drive
             if self.hold.active:
@@ -332,20 +329,15 @@ class Nav2Motion:
                 stalled.set()
 
     def _on_scan(self, _topic: str, scan: Scan, message: LaserScan) -> None:
-        """Read the doors by a scan, if it is known from where it was made; offer it for a
-        comparison with the map.
-        """
-        self._doubt.offer(scan, seconds_of(message.header.stamp), time.monotonic())
-        found = self._tf.pose(self._frames.base, self._frames.map, FRESH)
-        before, self._seen_from = self._seen_from, None
-        if found is None:
-            return
-        pose, now = found[0], seconds_of(message.header.stamp)
-        self._seen_from = pose, now
-        if before is not None and 0.0 < now - before[1] < FRESH:
-            turned = abs(angle_between(before[0][2], pose[2]))
-            if turned <= MOST_TURN_RATE * (now - before[1]) and not self._doubt.in_doubt:
-                self._doors.see(pose, scan, now)
+        self._scans.take(scan, seconds_of(message.header.stamp), time.monotonic())
+
+    def _on_placed(self, pose: Pose, scan: Scan, made: float, is_slow: bool) -> None:
+        """Compare a scan with the map, and read the doors by it."""
+        if self._doubt.is_due(time.monotonic()):
+            self._doubt.look(pose, scan, made)
+            self._tell_doubt(pose)
+        if is_slow and not self._doubt.in_doubt:
+            self._doors.see(pose, scan, made)
 
     def _publish(self, pose: Pose, stamp: float) -> None:
         """Tell `amcl_pose` where no other program does."""

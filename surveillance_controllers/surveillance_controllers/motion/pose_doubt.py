@@ -7,11 +7,9 @@ to tell a pose, sure of itself. Rays that go on through walls of the map, seen f
 from __future__ import annotations
 
 import math
-from collections import deque
-from itertools import pairwise
 
 from floor_plans import Grid
-from lidar_navigation.geometry import Pose, Scan, angle_between
+from lidar_navigation.geometry import Pose, Scan
 from lidar_navigation.localisation.scan_fit import ScanFit
 
 RAYS = 90
@@ -29,43 +27,6 @@ LOOK_PERIOD = 1.0
 """Time between two scans that are compared with the map, seconds."""
 AFTER = 5.0
 """A pose is in doubt that has not fitted for so long, seconds."""
-KEPT = 20
-"""So many poses are kept for the scans that come behind them."""
-WIDEST_GAP = 0.6
-"""Between two poses that are farther apart, seconds, nobody knows where the robot was;"""
-MOST_TURN = 0.1
-"""nor, exactly enough, where it turned by more than this, rad."""
-
-
-class PoseTrace:
-    """Where the robot was said to be, by stamp: a scan may come late."""
-
-    def __init__(self) -> None:
-        self._poses: deque[tuple[float, Pose]] = deque(maxlen=KEPT)
-
-    def add(self, stamp: float, pose: Pose) -> None:
-        """Add a pose of a time, seconds; an older one than the last begins anew."""
-        if self._poses and stamp <= self._poses[-1][0]:
-            if stamp == self._poses[-1][0]:
-                return
-            self._poses.clear()
-        self._poses.append((stamp, pose))
-
-    def is_past(self, stamp: float) -> bool:
-        """Tell whether there is a pose of this time or later."""
-        return bool(self._poses) and self._poses[-1][0] >= stamp
-
-    def at(self, stamp: float) -> Pose | None:
-        """Return where it was at a time, between two poses; None: that is not known."""
-        for (before, a), (after, b) in pairwise(self._poses):
-            if before <= stamp <= after:
-                turn = angle_between(a[2], b[2])
-                if after - before > WIDEST_GAP or abs(turn) > MOST_TURN:
-                    return None
-                part = (stamp - before) / (after - before)
-                x, y = (p + part * (q - p) for p, q in zip(a[:2], b[:2], strict=True))
-                return x, y, a[2] + part * turn
-        return None
 
 
 class PoseDoubt:
@@ -79,41 +40,19 @@ class PoseDoubt:
         self._fit: ScanFit | None = None
         self._since: float | None = None
         self.in_doubt = False
-        self._trace = PoseTrace()
-        self._scan: tuple[Scan, float] | None = None
-        self._offered_at = -math.inf
+        self._looked_at = -math.inf
 
     def set_map(self, grid: Grid) -> None:
         """Take the map that the pose is told in."""
         self._fit = ScanFit(grid)
         self._since = None
 
-    def offer(self, scan: Scan, stamp: float, now: float) -> None:
-        """Keep a scan each `LOOK_PERIOD` until the pose of its time is told.
-
-        Args:
-            scan: The scan.
-            stamp: Its time, seconds.
-            now: Steady time, seconds.
-        """
-        if now - self._offered_at >= LOOK_PERIOD:
-            self._offered_at = now
-            self._scan = scan, stamp
-
-    def take_pose(self, stamp: float, pose: Pose) -> Pose | None:
-        """Take where the robot is said to be at a time, seconds, map frame.
-
-        Returns:
-            The pose with which a scan was compared now; None: none was.
-        """
-        self._trace.add(stamp, pose)
-        if self._scan is None or not self._trace.is_past(self._scan[1]):
-            return None
-        (scan, made), self._scan = self._scan, None
-        there = self._trace.at(made)
-        if there is not None:
-            self.look(there, scan, made)
-        return there
+    def is_due(self, now: float) -> bool:
+        """Tell whether it is time to look again, steady seconds; then a look is expected."""
+        if self._fit is None or now - self._looked_at < LOOK_PERIOD:
+            return False
+        self._looked_at = now
+        return True
 
     def look(self, pose: Pose, scan: Scan, now: float) -> bool:
         """Take a scan from a pose; return whether the pose is in doubt.

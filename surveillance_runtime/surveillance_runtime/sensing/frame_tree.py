@@ -1,13 +1,15 @@
 """The frames of a robot as `tf` and `tf_static` tell them: where one is in another, and how old
 that is. No ROS in here: who hears the topics hands over matrices.
 
-As in tf2, each frame has one parent; the last word counts. tf2 does not say who else told of a
+As in tf2, each frame has one parent; the last word counts, and where a frame was at a time lies
+between the two words before and behind it. tf2 does not say who else told of a
 frame, so that two drivers which both do make a robot jump: `doubled` names them.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -20,6 +22,10 @@ SAME_PLACE = 0.02
 """Two words on a fixed frame that differ by less agree, metres and radians."""
 MOST_FRAMES = 10_000
 """Beyond so many frames, of what a stranger may make up, none is taken."""
+KEPT_SECONDS, MOST_KEPT = 5.0, 1000
+"""So long, and so many words long, it is known where a frame was."""
+WIDEST_GAP = 1.5
+"""Between two words that are farther apart, seconds, nobody knows where a frame was."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,7 @@ class FrameTree:
 
     links: dict[str, FrameLink] = field(default_factory=dict)
     doubled: dict[str, str] = field(default_factory=dict)
+    _past: dict[str, deque[FrameLink]] = field(default_factory=dict)
 
     def take(self, child: str, link: FrameLink) -> None:
         """Take where a frame is."""
@@ -76,15 +83,50 @@ class FrameTree:
                         "expected it once, from the robot's own description or from the profile"
                     )
         self.links[child] = link
+        if not math.isinf(link.stamp):
+            self._remember(child, link)
+
+    def _remember(self, child: str, link: FrameLink) -> None:
+        past = self._past.setdefault(child, deque(maxlen=MOST_KEPT))
+        if past and (link.stamp < past[-1].stamp or link.parent != past[-1].parent):
+            past.clear()  # the clock was set, or it begins anew
+        if past and link.stamp == past[-1].stamp:
+            past.pop()
+        past.append(link)
+        while link.stamp - past[0].stamp > KEPT_SECONDS:
+            past.popleft()
+
+    def _link_at(self, child: str, stamp: float) -> FrameLink | None:
+        """Return where a frame was at a time, seconds; None: that is not known, or not yet."""
+        last = self.links.get(child)
+        if last is None or math.isinf(last.stamp):
+            return last
+        behind = None
+        for link in reversed(self._past[child]):
+            if link.stamp == stamp:
+                return link
+            if link.stamp < stamp:
+                if behind is None or behind.stamp - link.stamp > WIDEST_GAP:
+                    return None
+                part = (stamp - link.stamp) / (behind.stamp - link.stamp)
+                return FrameLink(link.parent, _between(link.matrix, behind.matrix, part), stamp)
+            behind = link
+        return None
+
+    def is_past(self, child: str, root: str, stamp: float) -> bool:
+        """Tell whether all of the way from a frame to another one is told of a time or later."""
+        found = self.matrix(child, plain(root).__eq__)
+        return found is not None and found[1] >= stamp
 
     def matrix(
-        self, child: str, is_root: Callable[[str], bool]
+        self, child: str, is_root: Callable[[str], bool], at_time: float | None = None
     ) -> tuple[NDArray[np.float64], float, float] | None:
         """Return where a frame is in the first frame above it that is wanted.
 
         Args:
             child: The frame.
             is_root: Tells whether a frame is one to stop at.
+            at_time: Of when, seconds of the publishers' clock; None: the last word.
 
         Returns:
             Its matrix, the oldest stamp on the way, and when the oldest word on it came; None:
@@ -95,7 +137,7 @@ class FrameTree:
         for _ in range(len(self.links) + 1):
             if is_root(at):
                 return found, stamp, came
-            link = self.links.get(at)
+            link = self.links.get(at) if at_time is None else self._link_at(at, at_time)
             if link is None:
                 return None
             found = link.matrix @ found
@@ -118,6 +160,27 @@ class FrameTree:
         found = self.matrix(child, plain(root).__eq__)
         if found is None or now - found[2] > most_age:
             return None
-        matrix, stamp, _ = found
-        yaw = math.atan2(matrix[1, 0], matrix[0, 0])
-        return (float(matrix[0, 3]), float(matrix[1, 3]), yaw), stamp
+        return _in_plane(found[0]), found[1]
+
+    def pose_at(self, child: str, root: str, stamp: float) -> Pose | None:
+        """Return where a frame was in the plane of another one at a time, seconds; None: that is
+        not known, or not yet.
+        """
+        found = self.matrix(child, plain(root).__eq__, stamp)
+        return None if found is None else _in_plane(found[0])
+
+
+def _in_plane(matrix: NDArray[np.float64]) -> Pose:
+    yaw = math.atan2(matrix[1, 0], matrix[0, 0])
+    return float(matrix[0, 3]), float(matrix[1, 3]), yaw
+
+
+def _between(
+    before: NDArray[np.float64], behind: NDArray[np.float64], part: float
+) -> NDArray[np.float64]:
+    """Return the transform at a part of the way between two, shape (4, 4)."""
+    found: NDArray[np.float64] = before + part * (behind - before)
+    # The rotation nearest to the mean of two (the orthogonal factor of its polar decomposition).
+    left, _, right = np.linalg.svd(found[:3, :3])
+    found[:3, :3] = left @ right
+    return found
