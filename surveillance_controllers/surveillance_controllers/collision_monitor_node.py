@@ -2,10 +2,10 @@
 
 It stands between whoever commands `cmd_vel` (`motion_controller`, a joystick, any other program)
 and the base, which listens to `cmd_vel_monitored`. A command is slowed down so that the robot can
-brake before the nearest thing on its arc; without a fresh scan, or without a fresh command, the
-robot stands. What a person commands by hand (`cmd_vel_manual`, of the page) comes before
-`cmd_vel` while it lasts, and is limited alike. As a process of its own the monitor also stops a
-robot whose controller hangs.
+brake before the nearest thing on its arc. Without a fresh scan, or without a fresh command, the
+robot slows down by the age of the last one until it stands. What a person commands by hand
+(`cmd_vel_manual`, of the page) comes before `cmd_vel` while it lasts, and is limited alike. As a
+process of its own the monitor also stops a robot whose controller hangs.
 
 Keep-out zones stand in the way as walls do, and in slow zones the speed is theirs, as long as
 somebody tells where the robot is (`amcl_pose`).
@@ -50,7 +50,14 @@ from lidar_navigation.driving.path_following import (
 from lidar_navigation.geometry import Points, Pose, Scan, composed
 from lidar_navigation.robot_base import robot_deceleration, robot_footprint, robot_radius
 from strict_files.settings import parameter
-from surveillance_controllers.motion.command_publisher import STANDSTILL, CommandPublisher
+from surveillance_controllers.motion.command_publisher import (
+    LATENCY,
+    LONGEST_SILENCE,
+    STANDSTILL,
+    WALKING,
+    CommandPublisher,
+    blind_time,
+)
 from surveillance_controllers.motion.holding import COMMAND, STOPPED
 from surveillance_interfaces.msg import StopRequest as StopRequestMessage
 from surveillance_runtime.conversions import pose_of_serialized, stamp_of_serialized
@@ -88,8 +95,6 @@ UNGUARDED_AFTER = 4.0
 """A base that does not listen is told of after this time, seconds."""
 LONGEST_GUESS = 0.5
 """A pose is carried on by the velocity for at most this time, seconds."""
-LATENCY = 0.15
-"""Time between seeing and braking, seconds: a period of the lidar and a half."""
 TURN_DECELERATION = 3.0
 """With which the base stops turning, rad/s^2."""
 
@@ -103,9 +108,9 @@ class MonitorSettings:
     margin: float = parameter(0.02, 'Kept free beside the robot, m.', 0.0, 20.0)
     deceleration: float = robot_deceleration()
     longest_silence: float = parameter(
-        STANDSTILL,
-        'The robot stands when scan or cmd_vel is overdue by this, and brakes before, '
-        's of ROS time.',
+        LONGEST_SILENCE,
+        'The robot stands when scan or cmd_vel is overdue by this, sooner where something is near, '
+        'and brakes before, s of ROS time.',
         0.05,
         10.0,
     )
@@ -197,8 +202,9 @@ class CollisionMonitor(PatrolNode):
             (*self._lidar.settings.scans, 'cmd_vel'),
             self._settings.deceleration,
             self._warn_of_silence,
-            self._settings.longest_silence,
+            min(STANDSTILL, self._settings.longest_silence),
             frames.base,
+            self._patience,
         )
         if self._settings.wanted_type == 'TwistStamped':
             self.create_subscription(TwistStamped, 'cmd_vel', self._on_stamped_command, 1)
@@ -339,14 +345,12 @@ class CollisionMonitor(PatrolNode):
         # While nothing was seen the publisher lets nothing through.
         velocity = self._wanted
         far = self._settings.reach + self._settings.way_to_stand(velocity)
-        # Most of the time nothing is so near that the arc must be looked at.
-        near = [scan.points for scan in self._seen.values() if _nearest(scan) <= far]
-        if (self._zones.keep_out or self._zones.slow) and (pose := self._pose_now()):
+        pose = self._pose_now() if self._zones.keep_out or self._zones.slow else None
+        if pose is not None:
             velocity = within_limit(velocity, pose, self._zones, self._settings)
-            edges = self._zones.edges_near(pose, far)
-            near += [edges] if len(edges) else []
-        if near:
-            velocity = allowed(velocity, np.concatenate(near), self._settings)
+        near = self._near(far, pose)
+        if len(near):
+            velocity = allowed(velocity, near, self._settings)
         before = self._wanted
         held_back = abs(velocity.speed) < 0.5 * abs(before.speed) or (
             before.speed == 0.0 and abs(velocity.turn) < 0.5 * abs(before.turn)
@@ -355,6 +359,27 @@ class CollisionMonitor(PatrolNode):
             self.get_logger().warn('an obstacle is in the way: the robot is slowed down or stopped')
         self._is_held_back = held_back
         return velocity
+
+    def _near(self, far: float, pose: Pose | None) -> Points:
+        """Return what was seen, and edges of keep-out zones, where something of it is within some
+        metres of the robot; shape (n, 2), robot's frame.
+        """
+        # Most of the time nothing is so near that the arc must be looked at.
+        near = [scan.points for scan in self._seen.values() if _nearest(scan) <= far]
+        if pose is not None and len(edges := self._zones.edges_near(pose, far)):
+            near.append(edges)
+        return np.concatenate(near) if near else np.empty((0, 2))
+
+    def _patience(self, velocity: Velocity) -> float:
+        """Return how long the robot may take to stand when what it sees, or its command, is
+        overdue, seconds.
+        """
+        longest = self._settings.longest_silence
+        if time.monotonic() < self._manual_until:
+            return min(STANDSTILL, longest)  # a hand let go
+        far = self._settings.reach + (abs(velocity.speed) + WALKING) * (longest + LATENCY)
+        near = self._near(far, self._pose_now())
+        return blind_time(velocity, near, self._settings.body, self._settings.margin, longest)
 
     def _warn_of_silence(self, topic: str) -> None:
         # Commands may end at any time.

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import math
 import random
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from lidar_navigation import Velocity
+from lidar_navigation import Footprint, Velocity
 from surveillance_controllers.motion.command_publisher import (
     LEAD,
+    LONGEST_SILENCE,
     REACTION,
     STANDSTILL,
+    WALKING,
     CommandPublisher,
     SensorAge,
+    blind_time,
 )
+from surveillance_runtime.node import PatrolNode
 
 DECELERATION = 2.5
 LOOK_PERIOD = 0.01
+BODY = Footprint(0.22)
 
 
 @pytest.mark.parametrize('period', [0.02, 0.1, 0.2])
@@ -148,3 +155,111 @@ def test_a_sensor_that_is_too_slow_lets_nobody_drive_fast() -> None:
     for count in range(30):
         age.hear('scan', 1.0 * count)
     assert age.share(0.6, 29.5) == 0.0
+
+
+class Bases:
+    """Publishers one behind the other, with a clock that the test sets.
+
+    Attributes:
+        sent: What the last one let through last, m/s.
+    """
+
+    def __init__(self, graph: Any, patch: pytest.MonkeyPatch, count: int, patience: float) -> None:
+        self.now, self.sent = 0.0, 0.0
+        self._chain = [
+            CommandPublisher(
+                graph.add(PatrolNode, name=f'commander{number}'),
+                'cmd_vel',
+                ['scan'],
+                DECELERATION,
+                lambda _topic: None,
+                patience=lambda _velocity: patience,
+            )
+            for number in range(count)
+        ]
+        for base, behind in zip(self._chain, [*self._chain[1:], None], strict=True):
+            patch.setattr(base, '_now', lambda: self.now)
+            passed = SimpleNamespace(publish=partial(self._pass, behind))
+            patch.setattr(base, '_publisher', passed)
+            base._timer.cancel()
+            idle = SimpleNamespace(cancel=lambda: None, reset=lambda: None)
+            patch.setattr(base, '_timer', idle)
+
+    def _pass(self, behind: CommandPublisher | None, twist: Any) -> None:
+        if behind is None:
+            self.sent = twist.linear.x
+        else:
+            behind.command(Velocity(twist.linear.x))
+
+    def see(self, now: float) -> None:
+        """Have a scan come, and a command for it."""
+        self.now = now
+        for base in self._chain:
+            base.hear('scan')
+        self._chain[0].command(Velocity(0.5))
+
+    def blind_until(self, end: float) -> list[float]:
+        """Let time pass; return the speeds."""
+        speeds = []
+        while self.now < end:
+            self.now += LOOK_PERIOD
+            for base in self._chain:
+                base._limit_again()
+            speeds.append(self.sent)
+        return speeds
+
+
+def test_a_scan_that_is_late_where_nothing_is_ahead_slows_the_robot_down_by_its_age(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bases = Bases(graph, monkeypatch, 1, LONGEST_SILENCE)
+    for count in range(30):
+        bases.see(0.1 * count)
+    assert bases.blind_until(2.9 + 0.1 + 0.25)[-1] > 0.3, 'it drives on'
+    speeds = bases.blind_until(2.9 + 0.1 + LONGEST_SILENCE)
+    assert speeds == sorted(speeds, reverse=True)
+    assert speeds[-1] == 0.0
+    bases.see(4.1)
+    assert bases.sent == 0.5
+
+
+def test_two_that_brake_for_one_silence_brake_no_harder_than_one(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ways = []
+    for count in (1, 2):
+        bases = Bases(graph, monkeypatch, count, LONGEST_SILENCE)
+        for number in range(30):
+            bases.see(0.1 * number)
+        ways.append(LOOK_PERIOD * sum(bases.blind_until(4.5)))
+    assert ways[1] == pytest.approx(ways[0], rel=0.1)
+
+
+def test_a_robot_that_takes_longer_to_stand_meets_nothing_that_it_saw_ahead() -> None:
+    seed = random.randrange(1 << 30)
+    print('seed', seed)
+    rng = random.Random(seed)
+    for _ in range(300):
+        speed = rng.uniform(0.05, 0.6)
+        room = rng.uniform(speed * 0.15 + speed**2 / (2 * DECELERATION), 3.0)
+        wall = np.array([[0.22 + room, 0.0]])
+        time = blind_time(Velocity(speed), wall, BODY, 0.0)
+        assert STANDSTILL <= time <= LONGEST_SILENCE
+        if time == STANDSTILL:
+            continue
+        walks = rng.choice([0.0, rng.uniform(0.0, WALKING)])
+        age = SensorAge(['scan'], DECELERATION)
+        for count in range(30):
+            age.hear('scan', 0.1 * count)
+        at, driven, left = 2.9, speed, room
+        while at < 2.9 + 2.0 and driven > 0.0:
+            at += LOOK_PERIOD
+            allowed = speed * age.share(speed, at - REACTION, time - STANDSTILL)
+            driven = max(allowed, driven - DECELERATION * LOOK_PERIOD)
+            left -= (driven + walks) * LOOK_PERIOD
+        assert driven == 0.0
+        assert left > -0.02, (speed, room, walks)
+
+
+def test_a_turn_on_the_spot_ends_as_soon_as_ever() -> None:
+    assert blind_time(Velocity(0.0, 1.0), np.empty((0, 2)), BODY, 0.02) == STANDSTILL

@@ -3,9 +3,11 @@
 A new command goes out at once. When a message is overdue, the last command goes out again and
 again, slower each time, until the robot stands: a robot that sees nothing stands.
 
-From speed v the base stands after v / a seconds. So that it stands `STANDSTILL` seconds after the
-first message that did not come, its speed is at most a (period + STANDSTILL - age): messages that
-come on time, or a little late, leave it as it is. The period is what the messages themselves show.
+From speed v the base stands after v / a seconds. Messages that come on time, or a little late,
+leave the speed as it is: it falls from the moment at which the base must brake so that it stands
+`STANDSTILL` seconds after the first message that did not come. How steeply it falls depends on what
+was seen: where nothing was ahead, the robot may take up to `longest_silence` seconds until it
+stands (`blind_time`). The period of the messages is what they themselves show.
 """
 
 from __future__ import annotations
@@ -17,15 +19,27 @@ from collections.abc import Callable, Iterable
 
 from geometry_msgs.msg import Twist, TwistStamped
 
-from lidar_navigation import Velocity
+from lidar_navigation import Footprint, Velocity
+from lidar_navigation.driving.path_following import as_forwards, room_ahead
+from lidar_navigation.geometry import Points
 from surveillance_controllers import conversions
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.profile.parameters import CommandSettings
 
 WATCH_PERIOD = 0.01
 """Time between two commands of a robot that is stopped, seconds."""
+BRAKING_STEPS = 20
+"""In so many steps a robot is stopped that may take longer."""
 STANDSTILL = 0.3
-"""The robot stands this long after the first message that did not come, seconds."""
+"""The robot stands this long after the first message that did not come, seconds, where something
+was near."""
+LONGEST_SILENCE = 1.0
+"""It stands this long after it, seconds, where nothing was ahead. (`source_timeout` of Nav2's
+collision monitor is 1 to 5 s, at full speed until then.)"""
+LATENCY = 0.15
+"""Time between seeing and braking, seconds: a period of the lidar and a half."""
+WALKING = 1.0
+"""So fast may come towards a robot what it does not see, m/s."""
 REACTION = 0.05
 """Time between a decision and the base's obedience, seconds."""
 LEAD = 0.1
@@ -39,6 +53,34 @@ TELL_AGAIN = 10.0
 """A topic that falls silent again and again is told of once in this time, seconds."""
 _COUNT = 10
 """Intervals of which the period is the mean."""
+
+
+def blind_time(
+    velocity: Velocity,
+    seen: Points,
+    body: Footprint,
+    margin: float,
+    longest: float = LONGEST_SILENCE,
+) -> float:
+    """Return how long after a missed message the robot may take until it stands, seconds.
+
+    It is the time to a collision with the nearest thing ahead, if that walks towards the robot.
+
+    Args:
+        velocity: With which the robot drives.
+        seen: What was seen last, robot's frame, shape (n, 2), metres.
+        body: The robot's shape.
+        margin: Kept free around it, metres.
+        longest: Never longer than this, seconds.
+    """
+    shortest = min(STANDSTILL, longest)
+    if velocity.speed == 0.0 or longest == shortest:
+        return shortest  # a turn on the spot overshoots
+    closing = abs(velocity.speed) + WALKING
+    horizon = closing * (longest + LATENCY)
+    forwards = as_forwards(velocity.speed, velocity.turn, seen, body)
+    room = room_ahead(*forwards, margin, horizon)
+    return min(longest, max(shortest, room / closing - LATENCY))
 
 
 class SensorAge:
@@ -85,10 +127,16 @@ class SensorAge:
         """Return after how long a robot of some speed, m/s, must brake if nothing is heard."""
         return self.left(now)[0] - REACTION - abs(speed) / self._deceleration
 
-    def share(self, speed: float, now: float) -> float:
-        """Return the part of a wanted speed, m/s, that the robot may drive with, 0 to 1."""
-        left = self.left(now)[0] - REACTION
-        braking = abs(speed) / self._deceleration
+    def share(self, speed: float, now: float, more: float = 0.0) -> float:
+        """Return the part of a wanted speed that the robot may drive with, 0 to 1.
+
+        Args:
+            speed: The wanted one, m/s.
+            now: Seconds.
+            more: The robot may take so much longer until it stands, seconds.
+        """
+        left = self.left(now)[0] - REACTION + more
+        braking = abs(speed) / self._deceleration + more
         if left <= 0.0:
             return 0.0
         return 1.0 if left >= braking else left / braking
@@ -106,6 +154,9 @@ class CommandPublisher:
         on_silence: Told the topic for whose silence the robot stands, once until it drives again,
             and not more often than each `TELL_AGAIN`.
         standstill: The robot stands this long after the first message that did not come, seconds.
+        patience: Returns the time that a robot with some velocity may take in place of
+            `standstill`, by what it saw last, seconds. It is asked when a message is overdue, and
+            may not wait.
 
     Attributes:
         wanted: The last command, before it was limited by the age of what was heard.
@@ -122,6 +173,7 @@ class CommandPublisher:
         on_silence: Callable[[str], None],
         standstill: float = STANDSTILL,
         frame: str = '',
+        patience: Callable[[Velocity], float] | None = None,
     ) -> None:
         stamped = node.declare_fields(CommandSettings()).command_type == 'TwistStamped'
         self._frame = frame
@@ -129,6 +181,10 @@ class CommandPublisher:
         self._logger = node.get_logger()
         self._on_silence = on_silence
         self._age = SensorAge(heard, deceleration, standstill)
+        self._standstill, self._patience = standstill, patience
+        # Of what was seen last: how much longer the robot may take, and the speed it had then.
+        self._more: float | None = None
+        self._top = 0.0
         self._lock = threading.Lock()
         self._publisher = node.create_publisher(TwistStamped if stamped else Twist, topic, 1)
         self._is_stamped = stamped
@@ -143,11 +199,12 @@ class CommandPublisher:
         """Note that a message of a topic has come."""
         with self._lock:
             self._age.hear(topic, self._now())
+            self._more = None
 
     def command(self, velocity: Velocity) -> None:
         """Publish a command as far as the age of what was heard allows it."""
         with self._lock:
-            self.wanted = self.sustained(velocity)
+            self.wanted, self._more = self.sustained(velocity), None
             now = self._now()
             self._publish(now)
             self._watch(now)
@@ -171,11 +228,23 @@ class CommandPublisher:
                 self._publish(now)
             self._watch(now)
 
+    def _share(self, now: float) -> float:
+        """Return the part of what is wanted that goes out."""
+        speed = abs(self.wanted.speed)
+        if self._age.share(speed, now) == 1.0:
+            self._top = speed
+            return 1.0
+        if self._more is None:
+            longest = self._standstill if self._patience is None else self._patience(self.wanted)
+            self._more = max(0.0, longest - self._standstill)
+        # Whoever commands may brake for the same silence: that is not to count twice.
+        top = max(self._top, speed)
+        # A new command, too, is for a little later: else it would end what the last one began.
+        share = self._age.share(top, now + LEAD, self._more)
+        return min(1.0, share * top / speed) if speed else share
+
     def _publish(self, now: float) -> None:
-        share = self._age.share(self.wanted.speed, now)
-        if share < 1.0:
-            # A new command, too: else it would end what the last one began.
-            share = self._age.share(self.wanted.speed, now + LEAD)
+        share = self._share(now)
         limited = Velocity(share * self.wanted.speed, share * self.wanted.turn)
         twist = conversions.twist_from(limited)
         if self._is_stamped:
@@ -198,7 +267,8 @@ class CommandPublisher:
             self._timer.cancel()
             return
         wait = self._age.seconds_to_brake(self.wanted.speed, now)
-        self._timer.timer_period_ns = int(1e9 * max(wait, WATCH_PERIOD))
+        step = max(WATCH_PERIOD, (self._more or 0.0) / BRAKING_STEPS)
+        self._timer.timer_period_ns = int(1e9 * max(wait, step))
         self._timer.reset()
 
     def _now(self) -> float:

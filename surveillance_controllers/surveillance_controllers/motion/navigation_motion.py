@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
@@ -26,7 +27,7 @@ from surveillance_controllers import conversions
 from surveillance_controllers.controller_parameters import MotionSettings, NavigationSettings
 from surveillance_controllers.map_knowledge import MapKnowledge
 from surveillance_controllers.motion.arrival import MotionFailedError, expect_place
-from surveillance_controllers.motion.command_publisher import CommandPublisher
+from surveillance_controllers.motion.command_publisher import CommandPublisher, blind_time
 from surveillance_controllers.motion.door_teller import DoorTeller
 from surveillance_controllers.motion.goal_execution import GoalExecution
 from surveillance_controllers.motion.holding import Hold
@@ -93,6 +94,8 @@ class NavigationMotion:
         self._doors = DoorTeller(node, door_segments(node))
         self._navigator.before_search = self._stand_for_search
         self._stands_for_search = False
+        self._seen: dict[str, Scan] = {}
+        self._robot = robot
         self._seeks = False
         self._place_told: str | None = None
         self._base = CommandPublisher(
@@ -102,6 +105,7 @@ class NavigationMotion:
             robot.deceleration,
             self._warn_of_silence,
             frame=self._frames.base,
+            patience=self._patience,
         )
         self._goals = GoalExecution(
             node,
@@ -268,6 +272,7 @@ class NavigationMotion:
     def _see(self, scan: Scan, stamp: Any, topic: str = 'scan') -> None:
         measured = seconds_of(stamp)
         with self._goals.lock:
+            self._seen[topic] = scan
             self._base.hear(topic)
             self._stands_for_search = False
             velocity = self._navigator.see(scan, measured, topic)
@@ -290,6 +295,10 @@ class NavigationMotion:
         if self._base.wanted.speed != 0.0:
             self._base.command(Velocity())
             self._stands_for_search = True
+
+    def _patience(self, velocity: Velocity) -> float:
+        seen = np.concatenate([scan.points for scan in self._seen.values()] or [np.empty((0, 2))])
+        return blind_time(velocity, seen, self._robot.body, self._robot.margin)
 
     def _warn_of_silence(self, topic: str) -> None:
         self._node.get_logger().warn(f'nothing on the topic {topic}: the robot stands')
