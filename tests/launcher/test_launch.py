@@ -60,9 +60,8 @@ def process_of(launched: Started, node: str, after: int = 0) -> int:
 def test_ctrl_c_in_the_middle_of_the_start_ends_it(launch, moment):
     mission = launch('--mode', 'RANDOM', '--record', 'off')
     mission.until(moment)
-    code, seconds = mission.end(signal.SIGINT)
+    code, _ = mission.end(signal.SIGINT)
     assert code in (0, 130)
-    assert seconds < 60
     assert 'Traceback' not in '\n'.join(mission.lines)
     started = re.findall(r'\(process (\d+)\)', '\n'.join(mission.lines))
     assert gone([int(process) for process in started], 0)

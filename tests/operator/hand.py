@@ -74,7 +74,7 @@ class Hand:
         return self.viewer.js(f'return editor.place.{path}')
 
     def said(self, words: str) -> None:
-        self.viewer.until(lambda: words in self.viewer.text('#said'), 20.0)
+        self.viewer.until(lambda: words in self.viewer.text('#said'))
 
     def fill(self, field: str, text: str) -> None:
         from selenium.webdriver.common.by import By

@@ -37,7 +37,7 @@ def test_a_person_is_called_also_for_what_began_before(graph: Any, tmp_path: Pat
     graph.add(Alarm, parameters=parameters)
     graph.until(lambda: said.exists() and said.read_text() == 'D1 is closed\n')
     robot.incidents.end(DOOR, 'it is open')
-    graph.until(lambda: ('D1', 'end') in phases(tmp_path), 30.0)
+    graph.until(lambda: ('D1', 'end') in phases(tmp_path))
     graph.until(lambda: 'all clear after' in said.read_text())
     assert phases(tmp_path) == [('D1', 'begin'), ('D1', 'call'), ('D1', 'end')]
 

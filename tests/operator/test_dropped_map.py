@@ -63,7 +63,7 @@ def test_a_map_dropped_on_the_page_becomes_a_place(
     browser.until(lambda: browser.js('return Boolean(window.editor)'))
     assert not browser.js('return document.querySelector("#floor-section").checkVisibility()')
     drop_of(browser, tmp_path / 'flat.yaml')
-    browser.until(lambda: 'flat.yaml names flat.pgm' in browser.text('#import-said'), 20.0)
+    browser.until(lambda: 'flat.yaml names flat.pgm' in browser.text('#import-said'))
     drop_of(browser, tmp_path / 'flat.pgm')
     browser.until(lambda: '7 doors' in browser.text('#import-said'), 60.0)
     assert len(browser.js('return Object.keys(editor.place.rooms)')) == 7
@@ -83,7 +83,7 @@ def test_a_map_dropped_on_the_page_becomes_a_place(
     hand.fill('name', 'kitchen\n')
     hand.said(f'{room} is kitchen')
     drop_of(browser, tmp_path / 'flat.yaml', tmp_path / 'flat.pgm')
-    browser.until(lambda: 'is not saved' in browser.text('#import-said'), 20.0)
+    browser.until(lambda: 'is not saved' in browser.text('#import-said'))
     browser.click('#save')
     hand.said('written: ')
     assert 'kitchen' in read_place(folder / 'flat_place.yaml').plan.place.rooms
@@ -105,7 +105,7 @@ def test_a_chosen_picture_needs_its_scale(browser: Viewer, open_page: Page, tmp_
     browser.driver.get(open_page.address)
     browser.until(lambda: browser.js('return Boolean(window.editor)'))
     browser.driver.find_element(By.ID, 'files').send_keys(str(tmp_path / 'plan.png'))
-    browser.until(lambda: 'says nothing of its scale' in browser.text('#import-said'), 20.0)
+    browser.until(lambda: 'says nothing of its scale' in browser.text('#import-said'))
     assert browser.js('return document.documentElement.scrollWidth') <= PHONE[0]
     browser.driver.find_element(By.ID, 'scale').send_keys('0.1')
     browser.click('#import-now')

@@ -43,11 +43,11 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
     hand.said('C2 is cut: the new part is R5')
     hand.tool('select')
     hand.click(8.3, 3.5)
-    browser.until(lambda: browser.text('#chosen-h') == 'room R1', 20.0)
+    browser.until(lambda: browser.text('#chosen-h') == 'room R1')
     hand.fill('name', 'R2')
-    browser.until(lambda: "there is a 'R2' already" in hand.problem, 20.0)
+    browser.until(lambda: "there is a 'R2' already" in hand.problem)
     hand.fill('name', 'kitchen')
-    browser.until(lambda: not hand.problem, 20.0)
+    browser.until(lambda: not hand.problem)
     browser.js(
         'const send = window.fetch; window.sent = [];'
         'window.fetch = (at, all) => { window.sent.push(at); return send(at, all); };'
@@ -56,11 +56,11 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
         'input.dispatchEvent(new Event("change")); input.form.requestSubmit()'
     )
     hand.said('R1 is kitchen')
-    browser.until(lambda: browser.text('#chosen-h') == 'room kitchen', 20.0)
+    browser.until(lambda: browser.text('#chosen-h') == 'room kitchen')
     assert browser.js('return window.sent').count('/act/edit') == 1
     assert not hand.problem
     hand.fill('hours', 'mon-fri 8')
-    browser.until(lambda: hand.problem.startswith('hours.kitchen: '), 20.0)
+    browser.until(lambda: hand.problem.startswith('hours.kitchen: '))
     hand.fill('hours', 'mon-fri 08:00-18:00')
     hand.keys(Keys.ENTER)
     hand.said('kitchen: hours')
@@ -70,7 +70,7 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
     hand.tool('keep_out')
     hand.drag((8.5, 8.8), (9.0, 9.0), (9.5, 9.8))
     hand.said('zone K1')
-    browser.until(lambda: browser.text('#chosen-h') == 'zone K1', 20.0)
+    browser.until(lambda: browser.text('#chosen-h') == 'zone K1')
     hand.tool('slow')
     for corner in ((16.0, 3.0), (17.0, 3.0), (17.0, 4.0)):
         hand.click(*corner)
@@ -78,7 +78,7 @@ def test_a_place_is_changed_by_mouse_and_saved(browser: Viewer, page: Page, file
     hand.said('zone S1')
     hand.tool('join')
     hand.click(16.0, 16.0)
-    browser.until(lambda: 'R4' in browser.text('#hint'), 20.0)
+    browser.until(lambda: 'R4' in browser.text('#hint'))
     hand.click(16.0, 12.0)
     hand.said('R5 is a part of R4')
     assert browser.text('#changed') == 'changed, not saved'
@@ -114,7 +114,7 @@ def test_what_is_left_out_becomes_a_room_at_one_tap(browser: Viewer, tmp_path: P
             'const list = document.querySelector("#list"); list.value = "left_out 1";'
             'list.dispatchEvent(new Event("change"))'
         )
-        browser.until(lambda: browser.text('#chosen-h') == 'left out 1', 20.0)
+        browser.until(lambda: browser.text('#chosen-h') == 'left out 1')
         assert 'outside of the building' in browser.text('[data-field=take]')
         assert browser.axe() == []
     finally:
@@ -135,7 +135,7 @@ def test_what_a_newer_map_changed_is_decided_piece_by_piece(
     page.start()
     try:
         hand = Hand(browser, page)
-        browser.until(lambda: 'R5 is new' in browser.text('#changes'), 20.0)
+        browser.until(lambda: 'R5 is new' in browser.text('#changes'))
         assert browser.axe() == []
         browser.click('#changes [aria-label="Keep as it was: room R5"]')
         hand.said('as before: room R5')
@@ -162,7 +162,7 @@ def test_a_place_is_changed_without_a_mouse(browser: Viewer, page: Page, file: P
     hand.keys('d')
     assert browser.attribute('[data-tool=door]', 'aria-pressed') == 'true'
     hand.keys('v', Keys.ENTER)
-    browser.until(lambda: browser.text('#chosen-h') != 'Nothing chosen', 20.0)
+    browser.until(lambda: browser.text('#chosen-h') != 'Nothing chosen')
     assert middle
     browser.js(
         'const list = document.querySelector("#list"); list.value = "room R3";'
@@ -201,7 +201,7 @@ def test_a_place_is_changed_with_fingers_on_a_phone(browser: Viewer, page: Page)
     browser.click('#whole')
     hand.touch('touchStart', (15.0, 16.0))
     hand.touch('touchEnd')
-    browser.until(lambda: browser.text('#chosen-h') == 'room R4', 20.0)
+    browser.until(lambda: browser.text('#chosen-h') == 'room R4')
     browser.click('#undo')
     hand.said('undone')
 

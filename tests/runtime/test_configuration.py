@@ -265,10 +265,10 @@ def test_a_tag_before_what_is_not_of_its_type_costs_one_line(tmp_path, value):
 )
 def test_yaml_without_bound_is_refused_soon(tmp_path, text):
     path = written(tmp_path, text)
-    start = time.process_time()
+    start = time.thread_time()
     with pytest.raises(FileError) as caught:
         file_layer(path)
-    assert time.process_time() - start < 5.0
+    assert time.thread_time() - start < 5.0
     assert '\n' not in str(caught.value)
 
 

@@ -150,10 +150,10 @@ def test_a_waiting_coroutine_takes_no_processor_time(spun: Spun) -> None:
 
     task = spun.executor.create_task(waits)
     spun.executor.spin_once(timeout_sec=0.05)
-    used = time.process_time()
+    used = time.thread_time()
     spun.executor.spin_once(timeout_sec=0.5)
     spun.executor.spin_once(timeout_sec=0.5)
-    assert time.process_time() - used < 0.3
+    assert time.thread_time() - used < 0.3
     gate.set_result('now')
     spun.until(task.done)
     assert task.result() == 'now'

@@ -27,6 +27,7 @@ print('ready', flush=True)
 rclpy.spin(node)
 """
 SPEAKER = """
+import math
 import time
 import rclpy
 from std_msgs.msg import String
@@ -36,12 +37,15 @@ node = rclpy.create_node('speaker')
 words = node.create_publisher(String, 'words', 10)
 while not words.get_subscription_count():
     time.sleep(0.01)
-message, longest, end = String(data='x' * 2000), 0.0, time.monotonic() + 3.5
-while time.monotonic() < end:
-    began = time.monotonic()
-    words.publish(message)
-    longest = max(longest, time.monotonic() - began)
-    time.sleep(0.01)
+message, longest, tries = String(data='x' * 2000), math.inf, 0
+# A machine that stands for a second delays one try or two, hosts that are gone delay each.
+while longest >= 1.0 and tries < 5:
+    longest, tries, end = 0.0, tries + 1, time.monotonic() + 3.5
+    while time.monotonic() < end:
+        began = time.monotonic()
+        words.publish(message)
+        longest = max(longest, time.monotonic() - began)
+        time.sleep(0.01)
 print(longest)
 """
 

@@ -334,7 +334,7 @@ def test_the_failure_of_an_awaited_call_that_nobody_awaits_any_more_is_no_compla
     awaited.close()
     graph.until(lambda: all(t.name != 'call of ask' for t in threading.enumerate()))
     gc.collect()
-    assert capfd.readouterr().err == ''
+    assert 'never' not in capfd.readouterr().err  # awaited, retrieved
 
 
 def test_goal_succeeds_with_feedback(graph, server):
