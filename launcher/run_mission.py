@@ -38,6 +38,7 @@ from surveillance_runtime import event_log, node_table
 from surveillance_runtime.configuration import Entry
 from surveillance_runtime.discovery import LOCALHOST, problem_of
 from surveillance_runtime.event_log import record_in
+from surveillance_runtime.free_memory import give_back
 from surveillance_runtime.launch_protocol import EXIT_THERE, NotNowError
 from surveillance_runtime.profile import remappings
 from surveillance_runtime.run_files import LAUNCH_LOG, PARAMETERS, PLACE, TIMELINE
@@ -273,6 +274,7 @@ def _supervised(
 
         console = OperatorConsole(supervisor, log, node_table.CONSOLE)
         console.start()
+    give_back()  # what reading the configuration took
     try:
         code = supervisor.run(run.seconds)
     finally:

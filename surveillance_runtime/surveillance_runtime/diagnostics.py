@@ -18,6 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 
+from surveillance_runtime.free_memory import give_back
 from surveillance_runtime.health import ERROR, OK, RECENT, WARN, Finding
 from surveillance_runtime.launch_protocol import (
     AGE,
@@ -41,6 +42,8 @@ LATE = 0.5
 """Seconds by which an executor is late that are worth a warning."""
 HANGS = 3.0
 """Seconds by which an executor is late that are an error."""
+FIRST_RETURN, RETURN_PERIOD = 10, 60
+"""After how many messages freed memory is given back: most of it is of the start."""
 BEAT_PERIOD = 0.25
 """Seconds of real time between two heartbeats."""
 SLEPT_AFTER = 18.0
@@ -108,7 +111,7 @@ class Heartbeat:
 
 
 class DiagnosticsThread:
-    """Publishes the health of a process's nodes until it is stopped.
+    """Publishes the health of a process's nodes until it is stopped; gives freed memory back.
 
     Args:
         nodes: The nodes.
@@ -136,8 +139,12 @@ class DiagnosticsThread:
                 return
 
     def _work(self) -> None:
+        rounds = 0
         while not self._ended.wait(PERIOD):
             self._publish()
+            rounds += 1
+            if rounds % RETURN_PERIOD == FIRST_RETURN:
+                give_back()
 
     def _publish(self) -> None:
         late = self._lateness()
