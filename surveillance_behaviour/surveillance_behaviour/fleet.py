@@ -18,8 +18,8 @@ from patrol_policy.fleet import (
     FleetSettings,
     Intention,
     Layout,
+    PartitionCell,
     RightOfWay,
-    Share,
     may_be_contested,
     right_of_way,
 )
@@ -235,8 +235,8 @@ class FleetKnowledge:
         return found
 
 
-def share_of(decision: Decision, before: Share | None) -> Share | None:
+def cell_of(decision: Decision, before: PartitionCell | None) -> PartitionCell | None:
     """Return the share to publish with a decision: one to charge or on request keeps it."""
-    if decision.share is not None:
-        return decision.share
+    if decision.cell is not None:
+        return decision.cell
     return before

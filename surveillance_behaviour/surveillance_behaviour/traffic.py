@@ -17,7 +17,7 @@ from patrol_policy.graph import PatrolGraph
 from patrol_policy.situation import Decision, Situation
 from state_machines import Interrupt
 from state_machines.exceptions import CallInterruptedError
-from surveillance_behaviour.fleet import FleetKnowledge, share_of
+from surveillance_behaviour.fleet import FleetKnowledge, cell_of
 
 LOOK_AGAIN = 1.0
 """How long a robot waits for another one until it looks again, seconds."""
@@ -147,7 +147,7 @@ class FleetTraffic(Traffic):
             now=now,
             visits=visits,
             intention=wish,
-            share=share_of(decision, fleet.own.robot.share),
+            cell=cell_of(decision, fleet.own.robot.cell),
             dock=dock,
             **self._charge_facts(world, battery, dock),
             **begins,
@@ -194,7 +194,7 @@ class FleetTraffic(Traffic):
             rule=WAIT,
             reason=reason,
             stay=LOOK_AGAIN,
-            share=None,
+            cell=None,
             slot=None,
         )
 
@@ -207,7 +207,7 @@ class FleetTraffic(Traffic):
 
     def take_out(self, out: bool) -> str:
         """Take this robot out of the fleet's patrol, or put it back; return what was done."""
-        self.fleet.tell(taken_out=out, share=None)
+        self.fleet.tell(taken_out=out, cell=None)
         if out:
             return f'{self.fleet.name} is taken out: the others have its places'
         return f'{self.fleet.name} patrols again'

@@ -43,7 +43,7 @@ class Figure(NamedTuple):
         label: What stands before it.
         words: Returns what is shown; empty while it is not known.
         is_bad: Tells whether a person should look at it.
-        share: Returns how full it is, 0 to 1, where it is to be drawn as a bar; None: no bar.
+        fraction: Returns how full it is, 0 to 1, where it is to be drawn as a bar; None: no bar.
         awaited: The topic that is named while the figure is not known, and who publishes it; None:
             nothing is shown.
         is_brief: Whether it is shown where there is one line for a robot.
@@ -54,7 +54,7 @@ class Figure(NamedTuple):
     label: str
     words: Callable[[MissionState], str]
     is_bad: Callable[[MissionState], bool] = lambda _state: False
-    share: Callable[[MissionState], float | None] = lambda _state: None
+    fraction: Callable[[MissionState], float | None] = lambda _state: None
     awaited: tuple[str, str] | None = None
     is_brief: bool = False
     heard: FigureTopic | None = None
@@ -66,13 +66,13 @@ class ShownFigure(NamedTuple):
     figure: Figure
     words: str
     is_bad: bool
-    share: float | None
+    fraction: float | None
 
 
 def figures_of(state: MissionState) -> Iterator[ShownFigure]:
     """Yield every figure as it is now, in the order of the table."""
     for each in FIGURES:
-        yield ShownFigure(each, each.words(state), each.is_bad(state), each.share(state))
+        yield ShownFigure(each, each.words(state), each.is_bad(state), each.fraction(state))
 
 
 def figures_line(state: MissionState, *, brief: bool = False) -> str:

@@ -130,7 +130,7 @@ class Notice:
 
 
 @dataclass(frozen=True)
-class PatrolShare:
+class FleetReport:
     """What a robot of a fleet tells the others; see FleetRobot.msg.
 
     Attributes:
@@ -163,7 +163,7 @@ class TaskView:
         decision, decision_number: The latest decision, and its number.
         idleness_bounds, hours: Of each place, and the hours of those that have some.
         requests: What each controller in MANUAL mode announced last.
-        share: What it tells the other robots of a fleet; None: there are none.
+        fleet_report: What it tells the other robots of a fleet; None: there are none.
         stopped: Whether a person has stopped the robot.
         battery, battery_low: Percent, and whether that is low.
     """
@@ -177,7 +177,7 @@ class TaskView:
     idleness_bounds: tuple[IdlenessBound, ...] = ()
     hours: Mapping[str, str] = field(default_factory=dict)
     requests: Mapping[str, str] = field(default_factory=dict)
-    share: PatrolShare | None = None
+    fleet_report: FleetReport | None = None
     stopped: bool = False
     battery: float | None = None
     battery_low: bool = False
@@ -185,7 +185,7 @@ class TaskView:
     @property
     def is_out(self) -> bool:
         """Whether a person took the robot out of its fleet's patrol."""
-        return self.share is not None and self.share.taken_out
+        return self.fleet_report is not None and self.fleet_report.taken_out
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ STOPPED = 'the robot is stopped'
 
 def doing(state: MissionState) -> str:
     """Return in a few words what the robot is about."""
-    status, share = state.task.status, state.task.share
+    status, fleet_report = state.task.status, state.task.fleet_report
     if status is None:
         return 'begins' if state.health.nodes else 'not heard yet'
     if not state.health.nodes:
@@ -23,12 +23,12 @@ def doing(state: MissionState) -> str:
         return 'paused'
     if state.task.is_out:
         return 'taken out of the patrol'
-    if share is not None and share.dock and share.dock == state.robot_place:
-        return f'charging at {share.dock}'
-    if share is not None and share.heading_to:
-        kind = 'on its way to' if share.is_moving else 'waits to go to'
-        to_charge = f' to charge at {share.dock}' if share.dock else ''
-        return f'{kind} {share.heading_to}{to_charge}'
+    if fleet_report is not None and fleet_report.dock and fleet_report.dock == state.robot_place:
+        return f'charging at {fleet_report.dock}'
+    if fleet_report is not None and fleet_report.heading_to:
+        kind = 'on its way to' if fleet_report.is_moving else 'waits to go to'
+        to_charge = f' to charge at {fleet_report.dock}' if fleet_report.dock else ''
+        return f'{kind} {fleet_report.heading_to}{to_charge}'
     if status.heading_to not in ('', state.robot_place):
         return f'on its way to {status.heading_to}'
     return (status.state or 'begins').lower().replace('_', ' ')
@@ -36,12 +36,12 @@ def doing(state: MissionState) -> str:
 
 def shares(state: MissionState) -> str:
     """Return which places of a fleet's patrol are the robot's; empty: it is in no fleet."""
-    share = state.task.share
-    if share is None:
+    fleet_report = state.task.fleet_report
+    if fleet_report is None:
         return ''
-    if not share.tour:
+    if not fleet_report.tour:
         return 'no share'
-    return f'shares {", ".join(share.tour)}, next {share.stop}'
+    return f'shares {", ".join(fleet_report.tour)}, next {fleet_report.stop}'
 
 
 def troubles(state: MissionState) -> list[str]:

@@ -224,7 +224,7 @@ PARTS: Mapping[str, Callable[[MissionState], Any]] = {
     },
     'status': _status,
     'figures': lambda s: [
-        [each.figure.name, each.figure.label, each.words, each.is_bad, each.share]
+        [each.figure.name, each.figure.label, each.words, each.is_bad, each.fraction]
         for each in figures_of(s)
         if each.words
     ],

@@ -54,7 +54,7 @@ class Track:
     Attributes:
         line: What the page showed.
         sights: What lidar and camera saw; None for nothing.
-        read: Returns which share of the recording is in the time line, 0 to 1.
+        read: Returns how much of the recording is in the time line, 0 to 1.
         number: Of the line that is shown.
         marks: When what happened, seconds since 1970, as the log has it; empty: as the page showed.
     """
@@ -343,7 +343,7 @@ def _track(recording: Recording, stack: contextlib.ExitStack) -> Track:
         conversion = Conversion(recording.messages, path, keep=recording.timeline)
         stack.callback(conversion.stop)
         conversion.start()
-        read = conversion.share
+        read = conversion.progress
     line = Timeline(path, lambda problem: print(f'replay: {problem}', file=sys.stderr))
     stack.callback(line.close)
     marks = {} if recording.log is None else marks_of(recording.log)

@@ -47,11 +47,11 @@ from surveillance_operator.figures import FIGURES, Figure
 from surveillance_operator.mission_state import (
     NO_POINTS,
     TRAIL_STEP,
+    FleetReport,
     MachineContainer,
     MachineTransition,
     MissionState,
     NodeReport,
-    PatrolShare,
     Pose,
     Status,
 )
@@ -289,7 +289,7 @@ def _is_of_another(status: str, namespace: str) -> bool:
 def _on_fleet_robot(message: FleetRobot, old: MissionState) -> Fields:
     if message.robot != old.namespace.rpartition('/')[2]:
         return {}
-    share = PatrolShare(
+    report = FleetReport(
         _names(message.tour, 'places'),
         message.stop,
         message.dock,
@@ -298,7 +298,7 @@ def _on_fleet_robot(message: FleetRobot, old: MissionState) -> Fields:
         message.runs_until if math.isfinite(message.runs_until) else None,
         message.taken_out,
     )
-    return {} if share == old.task.share else {'share': share}
+    return {} if report == old.task.fleet_report else {'fleet_report': report}
 
 
 def _in_fleet(message: FleetRobot) -> frozenset[str]:

@@ -12,7 +12,7 @@ import pytest
 
 from floor_plans import Station
 from patrol_policy.decision import SHARE, WAIT, DecisionSettings
-from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
+from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, PartitionCell
 from patrol_policy.rule_table import URGENT, Priorities
 from patrol_policy.situation import Decision
 from state_machines import Interrupt
@@ -145,7 +145,7 @@ def test_facts_survive_the_message() -> None:
             'robot2',
             'C1',
             since=5.5,
-            share=Share(('C1', 'R1'), 'R1'),
+            cell=PartitionCell(('C1', 'R1'), 'R1'),
             charging_until=80.0,
             dock='E',
             charge_seconds=30.0,
@@ -352,17 +352,17 @@ def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
         robot.fleet.settings = FleetSettings(docks=('E',))
     air.run(40.0)
     model, now = first.model, air.now
-    share = first.fleet.own.robot.share
-    assert share is not None
-    tour = share.tour
+    cell = first.fleet.own.robot.cell
+    assert cell is not None
+    tour = cell.tour
     for step in range(60):  # 0.1 % a second
         model.learned.draw.observe(now - 60.0 + step, 90.0 - step // 10)
     first.world.set_level(60.0)
     first.world.is_in = first.going = 'E'
     model.arrived('E', now)
-    first.fleet.tell(share=Share(tour, 'E'))
+    first.fleet.tell(cell=PartitionCell(tour, 'E'))
     model.decide(now, NOBODY)  # Now all know what its battery needs.
-    first.fleet.tell(share=Share(tour, 'E'))
+    first.fleet.tell(cell=PartitionCell(tour, 'E'))
     decision = model.decide(now + 1.0, NOBODY)
     assert (decision.rule, decision.place) == ('recharge', 'E')
     assert 'charging in passing at E' in decision.reason
@@ -377,13 +377,13 @@ def test_a_charge_in_passing_keeps_the_share_and_has_its_time() -> None:
     first.world.set_level(61.0)
     own = second.fleet.outlook(model.graph, now).robots[0]
     assert own.charging_until == pytest.approx(ends, abs=1.5)
-    assert own.share == Share(tour, tour[(tour.index('E') + 1) % len(tour)])
+    assert own.cell == PartitionCell(tour, tour[(tour.index('E') + 1) % len(tour)])
     assert not model.charge_is_over(now + 2.0)
     assert model.why_charge()
     assert model.charge_is_over(decision.slot.end + 60.0)
     model.charged()
     assert model.why_charge() == ''
-    assert second.fleet.outlook(model.graph, now).robots[0].share == own.share
+    assert second.fleet.outlook(model.graph, now).robots[0].cell == own.cell
 
 
 def test_a_planned_charge_makes_good_what_a_round_has_cost() -> None:

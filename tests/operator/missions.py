@@ -10,9 +10,9 @@ import numpy as np
 from floor_plans import Grid
 from patrol_policy.situation import Decision
 from surveillance_operator.mission_state import (
+    FleetReport,
     MissionState,
     Notice,
-    PatrolShare,
     Status,
 )
 
@@ -71,7 +71,7 @@ def robot(name: str, place: str = 'A', x: float = 1.0) -> MissionState:
         positions={'A': (1.0, 1.0), 'B': (5.0, 1.0)},
         pose=(x, 1.0, 0.0),
         plan=np.array([(x, 1.0), (5.0, 1.0)]),
-        share=PatrolShare(('A', 'B'), 'B', heading_to='B', is_moving=True),
+        fleet_report=FleetReport(('A', 'B'), 'B', heading_to='B', is_moving=True),
         notices=(
             Notice(f'{name} begins', at=1e9),
             Notice('door D closed', at=1e9 + 1.0, shared=True),

@@ -92,7 +92,7 @@ def test_figures_follow_the_state() -> None:
     )
     known = {each.figure.name: each for each in figures_of(state)}
     assert (known['battery'].words, known['battery'].is_bad) == ('15 % (low)', True)
-    assert known['battery'].share == 0.15
+    assert known['battery'].fraction == 0.15
     assert known['doors'].words == 'D1 closed, 2 open'
     assert figures_line(state) == 'battery 15 % (low) · doors D1 closed, 2 open'
     assert figures_line(MissionState()) == ''

@@ -22,8 +22,8 @@ from strict_files.files import FileError
 from surveillance_behaviour.mission.mission_log import MissionRecord
 from surveillance_operator.mission_markers_node import markers_of
 from surveillance_operator.mission_state import (
+    FleetReport,
     Notice,
-    PatrolShare,
 )
 from surveillance_operator.page.broadcaster import Broadcaster
 from surveillance_operator.page.server import Page
@@ -243,7 +243,8 @@ def test_one_robot_or_all_are_told(
         ('stop', 'anna'),
     ]
     viewer.until(lambda: viewer.text('#fleet-answer') == '✓ stop anna')
-    broadcaster.show(FLEET['anna'].having(stopped=True, share=PatrolShare(taken_out=True)), 'anna')
+    out = FleetReport(taken_out=True)
+    broadcaster.show(FLEET['anna'].having(stopped=True, fleet_report=out), 'anna')
     words = 'return [...document.querySelectorAll("[data-row=anna] [data-word]")]'
     words += '.filter((each) => !each.hidden).map((each) => each.dataset.word)'
     viewer.until(lambda: viewer.js(words) == ['pause', 'release', 'in'])

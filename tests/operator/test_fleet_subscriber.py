@@ -12,7 +12,7 @@ from surveillance_interfaces.msg import DoorStates
 from surveillance_operator.fleet_actions import WORDS, FleetActions
 from surveillance_operator.fleet_subscriber import FleetSubscriber
 from surveillance_operator.mission_state import (
-    PatrolShare,
+    FleetReport,
 )
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.qos import STATE_QOS
@@ -40,7 +40,7 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
             each.task.status
             and each.sensors.pose
             and each.task.battery
-            and each.task.share
+            and each.task.fleet_report
             and each.place.doors
             and each.health.reports
             for each in seen
@@ -55,7 +55,7 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
         'place_of_bertha',
     )
     assert (anna.task.battery, bertha.task.battery) == (40.0, 60.0)
-    assert anna.task.share == PatrolShare(('A', 'anna'), 'anna', runs_until=9.0)
+    assert anna.task.fleet_report == FleetReport(('A', 'anna'), 'anna', runs_until=9.0)
     assert anna.place.doors == bertha.place.doors == {'D': False}
     assert anna.health.reports.keys() == {'anna/motion_controller', 'armor_server'}
     assert list(subscriber.see()) == ['anna', 'bertha', ''], 'what they share is last'

@@ -7,8 +7,8 @@ from dataclasses import replace
 from surveillance_operator.fleet_table import fleet_lines
 from surveillance_operator.mission_changes import follow
 from surveillance_operator.mission_state import (
+    FleetReport,
     NodeReport,
-    PatrolShare,
 )
 from surveillance_operator.mission_words import doing, troubles
 from tests.operator.missions import FLEET
@@ -17,10 +17,11 @@ from tests.operator.missions import FLEET
 def test_what_a_robot_does_and_what_is_wrong_with_it_is_said_in_words() -> None:
     anna = FLEET['anna']
     assert doing(anna) == 'on its way to B'
-    share = anna.task.share
-    assert share is not None
-    assert doing(anna.having(share=replace(share, is_moving=False))) == 'waits to go to B'
-    out = anna.having(share=PatrolShare(taken_out=True))
+    fleet_report = anna.task.fleet_report
+    assert fleet_report is not None
+    waiting = replace(fleet_report, is_moving=False)
+    assert doing(anna.having(fleet_report=waiting)) == 'waits to go to B'
+    out = anna.having(fleet_report=FleetReport(taken_out=True))
     assert doing(out) == 'taken out of the patrol'
     assert [each.text for each in follow(anna, out, 1.0)[1]] == ['taken out of the patrol']
     reports = {

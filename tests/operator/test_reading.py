@@ -80,7 +80,7 @@ def test_what_other_programs_write_is_read_whole_or_torn(
     saved = list(torn.in_order())
     assert len(saved) > 40
     assert saved == every[: len(saved)]
-    assert torn.share == 1.0
+    assert torn.progress == 1.0
     assert torn.types['/two/battery_level'] == 'std_msgs/msg/UInt8'
     sights = RecordedSights(path)
     assert sights.scan(START + 4.5) == [[4.0, 0.0]]

@@ -26,7 +26,7 @@ def converted(recording: Path, path: Path) -> Timeline:
     conversion = Conversion(recording, path)
     conversion.start()
     conversion._thread.join(60)
-    assert conversion.share() == 1.0
+    assert conversion.progress() == 1.0
     return Timeline(path)
 
 

@@ -109,7 +109,7 @@ class SeenFloor:
 
 
 @dataclass(frozen=True)
-class SeenShare:
+class SeenFraction:
     """How much of a place was in view.
 
     Attributes:
@@ -154,7 +154,7 @@ class PlaceFloors:
         cells = np.asarray(self._labels == self.names.index(place) + 1)
         return cells if cells.any() else None
 
-    def shares(self, floor: SeenFloor, since: Mapping[str, float]) -> dict[str, SeenShare]:
+    def fractions(self, floor: SeenFloor, since: Mapping[str, float]) -> dict[str, SeenFraction]:
         """Return how much of each place was in view since a time of its own, seconds."""
         times = np.array([math.inf, *(since[name] for name in self.names)])[self._labels]
         seen = self._counted(floor.seen_since(times))
@@ -162,7 +162,7 @@ class PlaceFloors:
         if floor.counts_camera:
             shown = self._counted(floor.seen_since(times, camera=True)).astype(float)
         return {
-            name: SeenShare(
+            name: SeenFraction(
                 float(seen[number] / size),
                 float(seen[number] * self._side**2),
                 float(shown[number] / size),

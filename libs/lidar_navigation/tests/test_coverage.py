@@ -77,14 +77,14 @@ def test_the_part_of_each_place_that_was_in_view_within_a_time_of_its_own():
     floor = SeenFloor(grid, 100.0, camera=(100.0, math.pi / 2))
     places = PlaceFloors(floor.grid, {'A': west, 'B': ~west, 'none': west & ~west})
     floor.see((4.05, 2.05), 0.0, 7.0)  # in the middle, looking east
-    shares = places.shares(floor, {'A': 5.0, 'B': 8.0, 'none': 0.0})
-    assert shares.keys() == {'A', 'B'}
-    assert shares['A'].seen == 1.0
-    assert shares['A'].area == pytest.approx(16.0)
-    assert shares['A'].shown < 0.01
-    assert shares['A'].counted == shares['A'].shown
-    assert shares['B'].seen == 0.0
-    shown = places.shares(floor, {'A': 5.0, 'B': 5.0, 'none': 0.0})['B'].shown
+    fractions = places.fractions(floor, {'A': 5.0, 'B': 8.0, 'none': 0.0})
+    assert fractions.keys() == {'A', 'B'}
+    assert fractions['A'].seen == 1.0
+    assert fractions['A'].area == pytest.approx(16.0)
+    assert fractions['A'].shown < 0.01
+    assert fractions['A'].counted == fractions['A'].shown
+    assert fractions['B'].seen == 0.0
+    shown = places.fractions(floor, {'A': 5.0, 'B': 5.0, 'none': 0.0})['B'].shown
     assert 0.6 < shown < 0.9
     assert places.of('none') is None
     assert places.of('nowhere') is None

@@ -25,7 +25,7 @@ from patrol_policy.battery import (
     Charger,
     Energy,
 )
-from patrol_policy.fleet.assignment import FleetOutlook, Share
+from patrol_policy.fleet.assignment import FleetOutlook, PartitionCell
 from patrol_policy.policies import DEFAULT_POLICY, POLICIES, Charge, Scores, make_policy
 from patrol_policy.rule_table import (
     ANY,
@@ -250,7 +250,7 @@ def _shared(
         'time': world.now,
         'from_place': here,
         'policy': 'fleet',
-        'share': choice.share,
+        'cell': choice.cell,
     }
     if choice.slot is not None:
         return Decision(
@@ -261,7 +261,7 @@ def _shared(
             reason=choice.reason,
             slot=choice.slot,
         )
-    if choice.share is None:
+    if choice.cell is None:
         stay = max(1.0, (choice.until or world.now) - world.now)
         return Decision(
             **common, place=here, target=here, rule=WAIT, reason=choice.reason, stay=stay
@@ -270,8 +270,8 @@ def _shared(
     mine = replace(within, said={**within.said, **others})
     rule, allowed = candidates(mine)
     goal, graph = choice.place, world.graph
-    if not is_by_waiting(rule) and (far := _overdue(world, fleet, choice.share, enterable(within))):
-        common['share'] = Share(choice.share.tour, far)
+    if not is_by_waiting(rule) and (far := _overdue(world, fleet, choice.cell, enterable(within))):
+        common['cell'] = PartitionCell(choice.cell.tour, far)
         step = graph.route(here, far)[0]
         reason = (
             f'{far} is overdue ({world.idleness_in_words(far)}): by the rules no robot of its '
@@ -289,13 +289,13 @@ def _shared(
     # A stop that is closed for long is not on this robot's map, and is passed over.
     if goal in graph.index and goal != here and (step := graph.route(here, goal)[0]) in allowed:
         return Decision(**common, place=step, target=goal, rule=rule, reason=choice.reason)
-    for stop in _onward(choice.share):
+    for stop in _onward(choice.cell):
         if stop == here or stop not in graph.index:
             continue
         if rule == ANY or mine.is_in(stop, rule) or mine.is_urgent(stop):
             step = graph.route(here, stop)[0]
             if step in allowed:
-                common['share'] = Share(choice.share.tour, stop)
+                common['cell'] = PartitionCell(choice.cell.tour, stop)
                 reason = f'{stop} is the next on the tour that the rules allow ({rule})'
                 if goal != here:  # why it would stay is no reason to go
                     reason += f'; {choice.reason}'
@@ -319,7 +319,7 @@ def _shared(
 def _overdue(
     world: Situation,
     fleet: FleetOutlook,
-    share: Share,
+    cell: PartitionCell,
     onward: Collection[str],
 ) -> str:
     """Return a stop of the robot's group that has been URGENT for a whole tour; empty: none.
@@ -332,7 +332,7 @@ def _overdue(
     Args:
         world: What is known.
         fleet: The same of all robots.
-        share: What the robot drives to by its share.
+        cell: What the robot drives to by its share.
         onward: The neighbours that may be entered now, whatever their class.
     """
     if not world.table.has_urgent:
@@ -346,7 +346,7 @@ def _overdue(
 
     overdue = [
         stop
-        for stop in _onward(share)
+        for stop in _onward(cell)
         if world.idleness_of(stop) > world.threshold_of(stop) + late and can_go(stop)
     ]
     if not overdue:
@@ -355,11 +355,11 @@ def _overdue(
     sharing = fleet.sharing(world.now)
     # Who charges is on no way, and comes to it later than whoever finds it overdue.
     ways = {
-        robot.name: (world.place if robot.name == fleet.name else robot.place, robot.share.stop)
+        robot.name: (world.place if robot.name == fleet.name else robot.place, robot.cell.stop)
         for robot in fleet.robots
         if robot.name in sharing
-        and robot.share is not None
-        and robot.share.tour == share.tour
+        and robot.cell is not None
+        and robot.cell.tour == cell.tour
         and robot.charging_until is None
     }
 
@@ -374,10 +374,10 @@ def _overdue(
     return next((stop for stop in overdue if not is_taken(stop)), '')
 
 
-def _onward(share: Share) -> tuple[str, ...]:
+def _onward(cell: PartitionCell) -> tuple[str, ...]:
     """Return the stops of a share's tour from its own stop on."""
-    first = share.tour.index(share.stop)
-    return share.tour[first:] + share.tour[:first]
+    first = cell.tour.index(cell.stop)
+    return cell.tour[first:] + cell.tour[:first]
 
 
 def planning_view(world: Situation, battery: Battery, settings: DecisionSettings) -> Situation:

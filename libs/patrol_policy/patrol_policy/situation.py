@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patrol_policy.battery import Energy
-from patrol_policy.fleet.assignment import FleetOutlook, Share
+from patrol_policy.fleet.assignment import FleetOutlook, PartitionCell
 from patrol_policy.fleet.docks import DockSlot
 from patrol_policy.graph import PatrolGraph
 from patrol_policy.hours import ALWAYS_OPEN, Openings
@@ -237,7 +237,7 @@ class Decision:
         reason: One sentence with the numbers that decided.
         scores: The policy's value of each candidate.
         stay: How long the robot stays before it decides anew, seconds; 0: it goes.
-        share: What it took upon itself of the places of a fleet; None: nothing.
+        cell: What it took upon itself of the places of a fleet; None: nothing.
         slot: Its time at a dock, where a fleet has one for it.
     """
 
@@ -250,5 +250,5 @@ class Decision:
     reason: str
     scores: Mapping[str, float] = field(default_factory=dict)
     stay: float = 0.0
-    share: Share | None = None
+    cell: PartitionCell | None = None
     slot: DockSlot | None = None

@@ -18,7 +18,7 @@ from patrol_policy.fleet import (
     FleetOutlook,
     FleetRobot,
     FleetSettings,
-    Share,
+    PartitionCell,
     assign,
     choose,
     dock_slots,
@@ -97,9 +97,9 @@ def test_far_wings_get_robots_of_their_own() -> None:
 
 def test_the_order_of_the_facts_does_not_matter_and_shares_do_not_overlap() -> None:
     graph, robots = ring(12), fleet('P00', 'P00', 'P03', 'P07')
-    shares = assign(graph, robots, 0.0).shares
-    assert assign(graph, robots[::-1], 0.0).shares == shares
-    assert len({share.stop for share in shares.values()}) == len(robots)
+    cells = assign(graph, robots, 0.0).cells
+    assert assign(graph, robots[::-1], 0.0).cells == cells
+    assert len({cell.stop for cell in cells.values()}) == len(robots)
 
 
 def test_robots_that_start_together_spread_and_reach_the_plan() -> None:
@@ -126,23 +126,23 @@ def test_a_silent_robot_loses_its_share_with_the_next_decision() -> None:
     settings = FleetSettings(silent_after=10.0)
     robots = fleet('A0', 'B0', now=100.0)
     silent = replace(robots[1], heard_at=89.0)
-    assert set(assign(far_wings(), robots, 100.0, settings).shares) == {'robot1', 'robot2'}
+    assert set(assign(far_wings(), robots, 100.0, settings).cells) == {'robot1', 'robot2'}
     assignment = assign(far_wings(), [robots[0], silent], 100.0, settings)
-    assert set(assignment.shares) == {'robot1'}
-    assert len(assignment.shares['robot1'].tour) == 8
+    assert set(assignment.cells) == {'robot1'}
+    assert len(assignment.cells['robot1'].tour) == 8
 
 
 def test_a_reason_names_the_robot_that_is_charging() -> None:
     graph = far_wings()
-    shares = assign(graph, fleet('A0', 'B0', now=60.0), 60.0).shares
-    robots = [replace(robot, share=shares[robot.name]) for robot in fleet('A0', 'B0', now=60.0)]
+    cells = assign(graph, fleet('A0', 'B0', now=60.0), 60.0).cells
+    robots = [replace(robot, cell=cells[robot.name]) for robot in fleet('A0', 'B0', now=60.0)]
     robots[1] = replace(robots[1], charging_until=50_700.0)
     robots[0] = replace(robots[0], place='A3')
     found = []
     for _ in range(8):
         choice = choose(graph, robots, 'robot1', 60.0)
         found.append(choice.reason)
-        robots[0] = replace(robots[0], place=choice.place, share=choice.share)
+        robots[0] = replace(robots[0], place=choice.place, cell=choice.cell)
     assert 'B0 is mine: robot2 is charging until 14:05' in found
 
 
@@ -150,19 +150,19 @@ def test_who_has_a_share_keeps_it_when_another_one_joins() -> None:
     graph = ring(12)
     robots = fleet('P02', 'P08')
     tour = fleet_plan(graph, 2).groups[0].stops
-    robots = [replace(robot, share=Share(tour, robot.place)) for robot in robots]
-    shares = assign(graph, [*robots, FleetRobot('robot3', 'P05')], 0.0).shares
-    assert [shares[robot.name] for robot in robots] == [robot.share for robot in robots]
-    assert shares['robot3'].tour == tour
+    robots = [replace(robot, cell=PartitionCell(tour, robot.place)) for robot in robots]
+    cells = assign(graph, [*robots, FleetRobot('robot3', 'P05')], 0.0).cells
+    assert [cells[robot.name] for robot in robots] == [robot.cell for robot in robots]
+    assert cells['robot3'].tour == tour
 
 
 def test_two_that_took_the_same_share_part_again() -> None:
     graph = far_wings()
     tour = next(g.stops for g in fleet_plan(graph, 2).groups if 'A0' in g.stops)
-    robots = [replace(robot, share=Share(tour, 'A0')) for robot in fleet('A0', 'A1')]
-    shares = assign(graph, robots, 0.0).shares
-    assert shares['robot1'].tour == tour
-    assert 'B0' in shares['robot2'].tour
+    robots = [replace(robot, cell=PartitionCell(tour, 'A0')) for robot in fleet('A0', 'A1')]
+    cells = assign(graph, robots, 0.0).cells
+    assert cells['robot1'].tour == tour
+    assert 'B0' in cells['robot2'].tour
 
 
 needs_of_robots = st.lists(st.tuples(st.floats(0, 1000), st.floats(1, 100)), max_size=8)
@@ -262,12 +262,12 @@ def test_a_robot_charges_at_its_own_dock_alone() -> None:
     settings = FleetSettings(docks=('P05', 'P09'), own_docks=('P05',), charge_ratio=0.5)
     for place, charges in (('P05', True), ('P09', False)):
         (here,) = fleet(place)
-        low = replace(here, share=Share(tour, place), runs_until=900.0, charge_seconds=60.0)
+        low = replace(here, cell=PartitionCell(tour, place), runs_until=900.0, charge_seconds=60.0)
         choice = choose(graph, [low], low.name, 0.0, settings)
         assert (choice.slot is not None and choice.place == place) == charges
     # What does not wait for its tour leads to its own dock, too.
     (here,) = fleet('P09')
-    empty = replace(here, share=Share(tour, 'P09'), runs_until=1.0, charge_seconds=60.0)
+    empty = replace(here, cell=PartitionCell(tour, 'P09'), runs_until=1.0, charge_seconds=60.0)
     choice = choose(graph, [empty], empty.name, 0.0, settings)
     assert choice.place == 'P05'
 
@@ -276,43 +276,43 @@ def test_who_charges_as_planned_keeps_its_share_and_who_takes_long_does_not() ->
     graph, tour = ring(12), fleet_plan(ring(12), 1).groups[0].stops
     settings = FleetSettings(docks=('P05',), charge_ratio=0.2)
     robots = [
-        replace(robot, share=Share(tour, robot.place), runs_until=500.0)
+        replace(robot, cell=PartitionCell(tour, robot.place), runs_until=500.0)
         for robot in fleet('P05', 'P11')
     ]
     as_planned = replace(robots[0], dock='P05', charging_until=24.0)
-    shares = assign(graph, [as_planned, robots[1]], 0.0, settings).shares
-    assert shares == {'robot1': robots[0].share, 'robot2': robots[1].share}
+    cells = assign(graph, [as_planned, robots[1]], 0.0, settings).cells
+    assert cells == {'robot1': robots[0].cell, 'robot2': robots[1].cell}
     long = replace(robots[0], dock='P05', charging_until=97.0)
-    assert set(assign(graph, [long, robots[1]], 0.0, settings).shares) == {'robot2'}
+    assert set(assign(graph, [long, robots[1]], 0.0, settings).cells) == {'robot2'}
     # One whose charge makes no headway loses it, too.
     stuck = replace(as_planned, charging_until=104.0, heard_at=80.0)
     heard = replace(robots[1], heard_at=80.0)
-    assert set(assign(graph, [stuck, heard], 80.0, settings).shares) == {'robot2'}
+    assert set(assign(graph, [stuck, heard], 80.0, settings).cells) == {'robot2'}
 
 
 def test_who_is_at_its_stop_goes_to_the_next_and_who_is_not_goes_there_first() -> None:
     graph = ring(12)
     tour = fleet_plan(graph, 1).groups[0].stops
-    there = [FleetRobot('robot1', tour[3], share=Share(tour, tour[3]))]
-    assert choose(graph, there, 'robot1', 0.0).share == Share(tour, tour[4])
-    away = [FleetRobot('robot1', tour[3], share=Share(tour, tour[5]))]
+    there = [FleetRobot('robot1', tour[3], cell=PartitionCell(tour, tour[3]))]
+    assert choose(graph, there, 'robot1', 0.0).cell == PartitionCell(tour, tour[4])
+    away = [FleetRobot('robot1', tour[3], cell=PartitionCell(tour, tour[5]))]
     choice = choose(graph, away, 'robot1', 0.0)
-    assert (choice.place, choice.share) == (tour[5], Share(tour, tour[5]))
+    assert (choice.place, choice.cell) == (tour[5], PartitionCell(tour, tour[5]))
 
 
 def test_only_who_is_at_its_stop_lets_the_robot_ahead_go_on() -> None:
     graph = ring(12)
     tour = fleet_plan(graph, 2, whole=True).groups[0].stops
-    ahead = FleetRobot('robot2', tour[5], share=Share(tour, tour[5]))
-    there = FleetRobot('robot1', tour[4], share=Share(tour, tour[4]))
+    ahead = FleetRobot('robot2', tour[5], cell=PartitionCell(tour, tour[5]))
+    there = FleetRobot('robot1', tour[4], cell=PartitionCell(tour, tour[4]))
     choice = choose(graph, [there, ahead], 'robot1', 0.0)
     assert (choice.place, choice.until) == (tour[4], pytest.approx(50.0))
     # Far enough behind it goes on.
-    behind = replace(there, place=tour[11], share=Share(tour, tour[11]))
+    behind = replace(there, place=tour[11], cell=PartitionCell(tour, tour[11]))
     choice = choose(graph, [behind, ahead], 'robot1', 0.0)
     assert (choice.place, choice.until) == (tour[0], None)
     # On the way to its stop it has no place on the tour yet.
-    away = replace(there, place=tour[4], share=Share(tour, tour[3]))
+    away = replace(there, place=tour[4], cell=PartitionCell(tour, tour[3]))
     choice = choose(graph, [away, ahead], 'robot1', 0.0)
     assert (choice.place, choice.until) == (tour[3], None)
 
@@ -322,7 +322,7 @@ def test_only_who_is_at_its_stop_lets_the_robot_ahead_go_on() -> None:
 def test_one_robot_has_no_long_way_where_two_short_ones_would_do(seed: int) -> None:
     graph, draw = random_map(seed, 9), random.Random(seed)
     robots = fleet(*draw.choices(graph.places, k=3))
-    stops = [share.stop for share in assign(graph, robots, 0.0).shares.values()]
+    stops = [cell.stop for cell in assign(graph, robots, 0.0).cells.values()]
     ways = [
         sum(
             graph.seconds(robot.place, stop) ** 2 for robot, stop in zip(robots, order, strict=True)
@@ -345,7 +345,7 @@ def test_a_reason_says_with_whom_a_tour_is_shared(robots: int, shared: str) -> N
     graph = ring(20)
     tour = fleet_plan(graph, robots, whole=True).groups[0].stops
     spaced = [tour[20 * number // robots] for number in range(robots)]
-    fleet_of = [replace(robot, share=Share(tour, robot.place)) for robot in fleet(*spaced)]
+    fleet_of = [replace(robot, cell=PartitionCell(tour, robot.place)) for robot in fleet(*spaced)]
     assert shared in choose(graph, fleet_of, 'robot1', 0.0).reason
 
 
@@ -474,7 +474,7 @@ def test_what_is_overdue_is_driven_to_by_one_robot_alone() -> None:
     def rule_of(name: str, stops: dict[str, str]) -> tuple[str, str]:
         """Return what a robot drives to where R4 is overdue and all else was just visited."""
         robots = [
-            replace(robot, place=ways[robot.name], share=Share(tour, stops[robot.name]))
+            replace(robot, place=ways[robot.name], cell=PartitionCell(tour, stops[robot.name]))
             for robot in fleet('C1', 'C2')
         ]
         robots.sort(key=lambda robot: robot.name != name)
@@ -506,8 +506,8 @@ def test_a_fleet_enters_nothing_that_is_closed_and_passes_over_what_is_for_long(
         if here == shut:
             continue
         robots = [
-            replace(robot, heard_at=1000.0, share=Share(tour, share))
-            for robot, share in zip(fleet(here, 'E'), (stop, 'C2'), strict=True)
+            replace(robot, heard_at=1000.0, cell=PartitionCell(tour, cell))
+            for robot, cell in zip(fleet(here, 'E'), (stop, 'C2'), strict=True)
         ]
         seen = replace(
             fleet_world(robots),

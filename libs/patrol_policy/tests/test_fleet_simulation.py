@@ -16,7 +16,7 @@ from patrol_policy.fleet import (
     FleetOutlook,
     FleetRobot,
     FleetSettings,
-    Share,
+    PartitionCell,
     exact_wait,
     fleet_plan,
 )
@@ -117,9 +117,9 @@ def test_who_fails_on_its_way_begins_anew_where_it_was_and_is_heard_of_no_more()
     def policy(view: FleetView, name: str) -> FleetChoice:
         if name == 'b':
             robot = view.robots['a']
-            heard.append((view.now, robot.heard_at, robot.heard_since, robot.share))
+            heard.append((view.now, robot.heard_at, robot.heard_since, robot.cell))
         if name == 'a' and view.now < 1.0:
-            return FleetChoice('P3', None, Share(('P0', 'P3'), 'P3'), 'far')
+            return FleetChoice('P3', None, PartitionCell(('P0', 'P3'), 'P3'), 'far')
         return FleetChoice(view.robots[name].place, view.now + 5.0, None, 'it stays')
 
     run = FleetPatrol(ROW, {'a': 'P0', 'b': 'P3'}, policy, outages=[Outage('a', 10.0, 30.0)])
@@ -128,9 +128,9 @@ def test_who_fails_on_its_way_begins_anew_where_it_was_and_is_heard_of_no_more()
         (0.0, 'a', 'P0'), (7.0, 'a', 'P1'), (30.0, 'a', 'P1'), (35.0, 'a', 'P1'), (40.0, 'a', 'P1'),
     ]  # fmt: skip
     by_time = {at: rest for at, *rest in heard}
-    share = Share(('P0', 'P3'), 'P3')
-    assert by_time[5.0] == [5.0, -math.inf, share]
-    assert by_time[10.0] == by_time[25.0] == [10.0, -math.inf, share], 'since it fell silent'
+    cell = PartitionCell(('P0', 'P3'), 'P3')
+    assert by_time[5.0] == [5.0, -math.inf, cell]
+    assert by_time[10.0] == by_time[25.0] == [10.0, -math.inf, cell], 'since it fell silent'
     assert by_time[35.0] == [35.0, 30.0, None]
 
 

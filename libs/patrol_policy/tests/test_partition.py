@@ -20,7 +20,7 @@ from patrol_policy.fleet import (
     FleetError,
     FleetRobot,
     FleetSettings,
-    Share,
+    PartitionCell,
     assign,
     choose,
     dock_slots,
@@ -246,12 +246,12 @@ def test_new_robots_of_a_tour_begin_at_equal_distances(seed: int, robots: int, k
     for number in range(min(kept, robots)):
         stop = tour[(shift + 20 * number // robots) % 20]
         robot = team[number]
-        team[number] = FleetRobot(robot.name, stop, share=Share(tour, stop))
-    shares = assign(graph, team, 0.0).shares
-    assert len(shares) == robots
+        team[number] = FleetRobot(robot.name, stop, cell=PartitionCell(tour, stop))
+    cells = assign(graph, team, 0.0).cells
+    assert len(cells) == robots
     by_tour: dict[tuple[str, ...], list[int]] = {}
-    for share in shares.values():
-        by_tour.setdefault(share.tour, []).append(share.tour.index(share.stop))
+    for cell in cells.values():
+        by_tour.setdefault(cell.tour, []).append(cell.tour.index(cell.stop))
     for stops, numbers in by_tour.items():
         if len(stops) == 20:
             gaps = [
@@ -268,19 +268,19 @@ def test_a_tour_begins_where_that_ends_the_longest_wait_soonest() -> None:
     for number in range(10):
         visited = dict.fromkeys(graph.places, 1000.0) | {tour[number]: 500.0}
         robot = FleetRobot('robot1', tour[0], heard_at=1000.0)
-        (share,) = assign(graph, [robot], 1000.0, visited_at=visited).shares.values()
-        begin = share.tour.index(share.stop)
+        (cell,) = assign(graph, [robot], 1000.0, visited_at=visited).cells.values()
+        begin = cell.tour.index(cell.stop)
 
         def ends(first: int) -> float:
             # The way to where it begins, and along the tour up to each place.
-            away = graph.seconds(tour[0], share.tour[first])  # noqa: B023
+            away = graph.seconds(tour[0], cell.tour[first])  # noqa: B023
             return max(
                 away + 10.0 * ((at - first) % 10) + 1000.0 - visited[stop]  # noqa: B023
-                for at, stop in enumerate(share.tour)  # noqa: B023
+                for at, stop in enumerate(cell.tour)  # noqa: B023
             )
 
         assert ends(begin) == min(map(ends, range(10)))
-        begun.add(share.stop)
+        begun.add(cell.stop)
     assert len(begun) > 3
 
 
@@ -303,10 +303,10 @@ def test_facts_that_leave_a_robot_without_a_share_are_told() -> None:
     assert absent(changed(heard_since=95.1)) == 'robot2 is heard again only since 00:01'
     assert absent(changed(charging_until=7260.0)) == 'robot2 is charging until 02:01'
     told = choose(graph, [one, changed(taken_out=True)], 'robot2', 100.0, settings)
-    assert (told.place, told.until, told.share) == ('P04', 105.0, None)
+    assert (told.place, told.until, told.cell) == ('P04', 105.0, None)
     assert told.reason == 'no place is mine: robot2 is taken out'
     with pytest.raises(FleetError, match='robot2 drives to P01, expected a stop of its own tour'):
-        assign(graph, [one, changed(share=Share(('P00', 'P02'), 'P01'))], 100.0, settings)
+        assign(graph, [one, changed(cell=PartitionCell(('P00', 'P02'), 'P01'))], 100.0, settings)
 
 
 def test_groups_in_force_are_given_up_for_what_is_clearly_better_alone() -> None:
@@ -321,7 +321,7 @@ def test_groups_in_force_are_given_up_for_what_is_clearly_better_alone() -> None
     assert kept is not None
     gain = 1.0 - best.wait / kept.wait
     robots = [
-        FleetRobot(f'robot{number}', tour[0], share=Share(tour, tour[0]))
+        FleetRobot(f'robot{number}', tour[0], cell=PartitionCell(tour, tour[0]))
         for number, tour in enumerate(worse)
     ]
     for part, keeps in ((gain + 0.01, True), (gain - 0.01, False)):
@@ -337,8 +337,8 @@ TOUR = fleet_plan(RING, 1).groups[0].stops
 def robot_at(
     number: int, stop: int | None = None, name: str = 'robot1', **facts: Any
 ) -> FleetRobot:
-    share = Share(TOUR, TOUR[number if stop is None else stop])
-    return FleetRobot(name, TOUR[number], share=share, **facts)
+    cell = PartitionCell(TOUR, TOUR[number if stop is None else stop])
+    return FleetRobot(name, TOUR[number], cell=cell, **facts)
 
 
 def chosen(me: FleetRobot, *others: FleetRobot, now: float = 0.0, **settings: Any) -> FleetChoice:
@@ -402,7 +402,7 @@ def test_a_robot_charges_in_passing_as_long_as_planned() -> None:
         choice = chosen(charging(3, needs), now=100.0, **usual)
         assert choice.slot is not None
         assert (choice.slot.begin, choice.slot.end) == (100.0, pytest.approx(100.0 + stays))
-        assert choice.share == Share(TOUR, TOUR[4])
+        assert choice.cell == PartitionCell(TOUR, TOUR[4])
         assert choice.reason == (
             f'charging in passing at {dock} until 00:0{(100 + stays) // 60:.0f}: a stop of the '
             'tour of 150 s'
@@ -419,7 +419,7 @@ def test_a_robot_charges_in_passing_as_long_as_planned() -> None:
     for needs, charges in ((45.0, True), (44.9, False)):
         passing = chosen(charging(3, needs, stop=6), **usual)
         assert (passing.slot is not None) == charges
-        assert not charges or passing.share == Share(TOUR, TOUR[6])
+        assert not charges or passing.cell == PartitionCell(TOUR, TOUR[6])
     # It has been there just now.
     assert chosen(charging(3, 60.0, stop=4), **usual).slot is None
 

@@ -26,7 +26,7 @@ from lidar_navigation.coverage import (
     FloorSweep,
     PlaceFloors,
     SeenFloor,
-    SeenShare,
+    SeenFraction,
     SweepPlanner,
 )
 from patrol_policy.decision import DecisionSettings
@@ -202,14 +202,14 @@ class RosCoverage:
         """Return after how many seconds without a visit a place is URGENT."""
         return self._place.thresholds.get(place, self._choice.urgency_threshold)
 
-    def shares(self) -> dict[str, SeenShare]:
+    def fractions(self) -> dict[str, SeenFraction]:
         """Return how much of each place was in view within its threshold; from any thread."""
         known, now = self.known, self._now()
         if known is None:
             return {}
         since = {name: now - self.threshold(name) for name in known.places.names}
         with self._lock:
-            return known.places.shares(known.floor, since)
+            return known.places.fractions(known.floor, since)
 
     def share_since(self, place: str, since: float) -> float:
         """Return which part of a place was in view since a time, by all that counts."""
@@ -218,7 +218,7 @@ class RosCoverage:
             return 0.0
         times = dict.fromkeys(known.places.names, math.inf) | {place: since}
         with self._lock:
-            found = known.places.shares(known.floor, times)
+            found = known.places.fractions(known.floor, times)
         return found[place].counted if place in found else 0.0
 
     def see(self) -> None:
@@ -276,11 +276,11 @@ class RosCoverage:
             if self.known is None:
                 continue
             self.see()
-            if time.monotonic() - told_at >= PERIOD and (shares := self.shares()) != said:
+            if time.monotonic() - told_at >= PERIOD and (shares := self.fractions()) != said:
                 told_at, said = time.monotonic(), shares
                 self._topic.publish(self._message(shares))
 
-    def _message(self, shares: Mapping[str, SeenShare]) -> PlaceCoverages:
+    def _message(self, shares: Mapping[str, SeenFraction]) -> PlaceCoverages:
         now = self._now()
         return PlaceCoverages(
             places=[
@@ -394,7 +394,7 @@ class RosSweep:
 
     def covered(self) -> Mapping[str, float]:
         """Return which part of each place was in view within its threshold."""
-        return {name: share.counted for name, share in self._coverage.shares().items()}
+        return {name: share.counted for name, share in self._coverage.fractions().items()}
 
 
 def _time(seconds: float) -> Time:

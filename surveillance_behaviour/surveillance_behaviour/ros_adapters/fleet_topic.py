@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 
-from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, Share
+from patrol_policy.fleet import FleetRobot, FleetSettings, Intention, Layout, PartitionCell
 from strict_files.settings import parameter
 from surveillance_behaviour.fleet import FleetFacts, FleetKnowledge
 from surveillance_interfaces.msg import FleetRobot as FleetRobotMessage
@@ -129,8 +129,8 @@ def message_of(facts: FleetFacts) -> FleetRobotMessage:
         robot=robot.name,
         place=robot.place,
         since=robot.since,
-        tour=[] if robot.share is None else list(robot.share.tour),
-        stop='' if robot.share is None else robot.share.stop,
+        tour=[] if robot.cell is None else list(robot.cell.tour),
+        stop='' if robot.cell is None else robot.cell.stop,
         dock=robot.dock or '',
         charging_until=_number(robot.charging_until),
         runs_until=_number(robot.runs_until),
@@ -160,12 +160,12 @@ def facts_of(message: FleetRobotMessage) -> FleetFacts:
     if max(len(message.tour), len(message.visited)) > MOST_STOPS:
         raise ValueError(f'{message.robot}: more places than any map has')
     tour = tuple(message.tour)
-    share = Share(tour, message.stop) if message.stop in tour else None
+    cell = PartitionCell(tour, message.stop) if message.stop in tour else None
     robot = FleetRobot(
         message.robot,
         message.place,
         since=message.since,
-        share=share,
+        cell=cell,
         charging_until=_maybe(message.charging_until),
         dock=message.dock or None,
         runs_until=_maybe(message.runs_until),

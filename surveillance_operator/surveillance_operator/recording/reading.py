@@ -246,8 +246,8 @@ class Messages:
             return {name: kind for file in self._files for name, kind in file.types.items()}
 
     @property
-    def share(self) -> float:
-        """Which share of the recording `in_order` has passed, 0 to 1."""
+    def progress(self) -> float:
+        """How much of the recording `in_order` has passed, 0 to 1."""
         return self._passed / self._size
 
     def in_order(self, topics: Collection[str] | None = None) -> Iterator[Stored]:

@@ -123,9 +123,9 @@ class Conversion:
         if not self._topics.keys() & self._messages.types.keys():
             raise FileError(f'{recording}: holds no topic of a mission, like mission_status')
 
-    def share(self) -> float:
-        """Return which share of the recording is in the time line, 0 to 1."""
-        return self._messages.share if self._thread.is_alive() else 1.0
+    def progress(self) -> float:
+        """Return how much of the recording is in the time line, 0 to 1."""
+        return self._messages.progress if self._thread.is_alive() else 1.0
 
     def start(self) -> None:
         """Begin on a thread of its own; return when the time line has its first lines."""

@@ -286,9 +286,9 @@ def figure_lines(state: MissionState, width: int, *, brief: bool) -> list[Text]:
 def _figure(shown: ShownFigure, width: int) -> Text:
     """Return a figure, with a bar where it is a share of something."""
     line = Text(f'{shown.figure.label} ')
-    if shown.share is not None:
+    if shown.fraction is not None:
         cells = min(BAR, width - 18)
-        full = round(shown.share * cells)
+        full = round(shown.fraction * cells)
         line.append('█' * full, 'red1' if shown.is_bad else 'green3')
         line.append(f'{"░" * (cells - full)} ', DIM)
     return line.append(shown.words, URGENT if shown.is_bad else '')

@@ -17,7 +17,7 @@ from patrol_policy.fleet.assignment import (
     FleetOutlook,
     FleetRobot,
     FleetSettings,
-    Share,
+    PartitionCell,
     assign,
     choose,
 )
@@ -44,8 +44,8 @@ __all__ = [
     'Group',
     'Intention',
     'Layout',
+    'PartitionCell',
     'RightOfWay',
-    'Share',
     'assign',
     'choose',
     'dock_slots',

@@ -39,8 +39,8 @@ class FleetError(ValueError):
 
 
 @dataclass(frozen=True)
-class Share:
-    """What a robot took upon itself, as it publishes it.
+class PartitionCell:
+    """The cell of the partitioned map that a robot patrols, as it publishes it.
 
     Attributes:
         tour: The stops of its group, in order.
@@ -61,7 +61,7 @@ class FleetRobot:
         since: When it entered it, or when a charge there began or ended.
         heard_at: When it was last heard.
         heard_since: Since when it is heard without a gap.
-        share: The share it published last; None once it is back from an outage, so that it begins
+        cell: The share it published last; None once it is back from an outage, so that it begins
             in the largest gap.
         charging_until: When it has charged enough; None: it does not charge.
         dock: The dock it stands at or drives to in order to charge.
@@ -75,7 +75,7 @@ class FleetRobot:
     since: float = 0.0
     heard_at: float = 0.0
     heard_since: float = -math.inf
-    share: Share | None = None
+    cell: PartitionCell | None = None
     charging_until: float | None = None
     dock: str | None = None
     runs_until: float | None = None
@@ -127,7 +127,7 @@ class FleetOutlook:
     def sharing(self, now: float) -> frozenset[str]:
         """Return the names of the robots that have a share."""
         near, settings = self._of_this_map()
-        return frozenset(assign(self.graph, near, now, settings).shares)
+        return frozenset(assign(self.graph, near, now, settings).cells)
 
     def team(self, now: float) -> int:
         """Return how many robots have a share."""
@@ -142,8 +142,8 @@ class FleetOutlook:
             if robot.place not in stops:
                 continue
             # A share of another map counts for nothing.
-            if robot.share is not None and not set(robot.share.tour) <= stops:
-                robot = replace(robot, share=None)
+            if robot.cell is not None and not set(robot.cell.tour) <= stops:
+                robot = replace(robot, cell=None)
             near.append(robot if robot.dock in docks else replace(robot, dock=None))
         return near, replace(self.settings, docks=docks)
 
@@ -187,12 +187,12 @@ class Assignment:
 
     Attributes:
         plan: The groups and how many robots each has; None: no robot has a share.
-        shares: The share of each robot that has one.
+        cells: The share of each robot that has one.
         absent: Why each other robot has none, in words.
     """
 
     plan: FleetPlan | None
-    shares: Mapping[str, Share]
+    cells: Mapping[str, PartitionCell]
     absent: Mapping[str, str]
 
 
@@ -203,7 +203,7 @@ class FleetChoice:
     Attributes:
         place: The stop to drive to, or a dock; its own place when it stays.
         until: It stays where it is until then, seconds since 1970; None: it drives.
-        share: The share to publish; None: it has none.
+        cell: The share to publish; None: it has none.
         reason: Why, in words.
         slot: The time at the dock that it drives to.
         mine: The stops of its group that are its own: from the one it drives to up to the one that
@@ -213,7 +213,7 @@ class FleetChoice:
 
     place: str
     until: float | None
-    share: Share | None
+    cell: PartitionCell | None
     reason: str
     slot: DockSlot | None = field(default=None)
     mine: frozenset[str] = frozenset()
@@ -227,7 +227,7 @@ def assign(
     settings: FleetSettings | None = None,
     visited_at: Mapping[str, float] | None = None,
 ) -> Assignment:
-    """Share the places of a map among robots.
+    """PartitionCell the places of a map among robots.
 
     Args:
         graph: The map, connected.
@@ -249,9 +249,9 @@ def assign(
     for robot in robots:
         if robot.place not in graph.index:
             raise FleetError(f'{robot.name} is at {robot.place}, which is not a place of the map')
-        if robot.share is not None and robot.share.stop not in robot.share.tour:
+        if robot.cell is not None and robot.cell.stop not in robot.cell.tour:
             raise FleetError(
-                f'{robot.name} drives to {robot.share.stop}, expected a stop of its own tour'
+                f'{robot.name} drives to {robot.cell.stop}, expected a stop of its own tour'
             )
         if (reason := _absence(graph, robots, robot, now, settings)) is not None:
             absent[robot.name] = reason
@@ -287,13 +287,13 @@ def choose(
     me = replace(me, charging_until=None, dock=None)
     robots = [me if robot.name == name else robot for robot in robots]
     assignment = assign(graph, robots, now, settings, visited_at)
-    share = assignment.shares.get(name)
-    if share is None:
+    cell = assignment.cells.get(name)
+    if cell is None:
         reason = f'no place is mine: {assignment.absent[name]}'
         return FleetChoice(me.place, now + settings.back_after, None, reason)
-    group = _group(assignment, share)
-    reached = share.stop == me.place
-    onward = _next(group, share.stop) if reached else share
+    group = _group(assignment, cell)
+    reached = cell.stop == me.place
+    onward = _next(group, cell.stop) if reached else cell
     mine = _mine(group, assignment, robots, me, onward)
     slot, leave = _slot(graph, robots, me, onward.stop, now, settings, assignment)
     if _charges_in_passing(group, robots, me, reached, settings):
@@ -304,7 +304,7 @@ def choose(
             f'of {group.length:.0f} s'
         )
         # It goes on to the next stop afterwards, whatever it still lacks.
-        after = onward if reached else share
+        after = onward if reached else cell
         return FleetChoice(me.place, None, after, reason, DockSlot(name, me.place, now, end))
     if slot is not None and now >= leave:
         late = f', {slot.late:.0f} s late: the docks are too few' if slot.late > 1.0 else ''
@@ -322,7 +322,7 @@ def choose(
         return FleetChoice(
             me.place,
             now + seconds,
-            share,
+            cell,
             reason,
             mine=mine,
             overstays=now - me.since > group.wait,
@@ -346,7 +346,7 @@ def _charges_in_passing(
     """
     planned = _planned_charge(group, me.place, settings)
     least = max(min(settings.least_charge, planned), 0.0 if reached else 1.5 * planned)
-    has_been = not reached and me.place in group.position and me.share == _next(group, me.place)
+    has_been = not reached and me.place in group.position and me.cell == _next(group, me.place)
     return (
         planned > 0.0
         and not has_been
@@ -401,11 +401,11 @@ def _charges_too_long(
 
     That is longer than planned by more than the time from one robot of the group to the next.
     """
-    share, until = robot.share, robot.charging_until
-    if share is None or until is None or not set(share.tour) <= graph.index.keys():
+    cell, until = robot.cell, robot.charging_until
+    if cell is None or until is None or not set(cell.tour) <= graph.index.keys():
         return True
-    team = sum(other.share is not None and other.share.tour == share.tour for other in robots)
-    group = group_of(graph, share.tour, team).charging(settings.docks, settings.charge_ratio)
+    team = sum(other.cell is not None and other.cell.tour == cell.tour for other in robots)
+    group = group_of(graph, cell.tour, team).charging(settings.docks, settings.charge_ratio)
     planned = max(group.charges, default=0.0)
     return max(until, now) - robot.since > planned + group.wait
 
@@ -442,7 +442,7 @@ def _groups_in_force(
     best = fleet_plan(graph, len(present), docks=docks)
     # The absent robots' groups belong to the groups in force until others have taken them over.
     for some in (present, robots):
-        tours = sorted({robot.share.tour for robot in some if robot.share is not None})
+        tours = sorted({robot.cell.tour for robot in some if robot.cell is not None})
         times = Counter(stop for tour in tours for stop in tour)
         if times.keys() != graph.index.keys():
             continue
@@ -464,35 +464,35 @@ def _shares(
     present: Sequence[FleetRobot],
     now: float,
     visited_at: Mapping[str, float],
-) -> dict[str, Share]:
+) -> dict[str, PartitionCell]:
     """Keep the shares that are part of the plan, give the free ones to the rest."""
     number_of = {group.stops: number for number, group in enumerate(plan.groups)}
     members: list[list[FleetRobot]] = [[] for _ in plan.groups]
-    shares: dict[str, Share] = {}
+    cells: dict[str, PartitionCell] = {}
     rest = []
     for robot in present:
-        number = None if robot.share is None else number_of.get(robot.share.tour)
+        number = None if robot.cell is None else number_of.get(robot.cell.tour)
         full = number is not None and len(members[number]) >= plan.groups[number].robots
-        if robot.share is None or number is None or full:
+        if robot.cell is None or number is None or full:
             rest.append(robot)
         else:
             members[number].append(robot)
-            shares[robot.name] = robot.share
+            cells[robot.name] = robot.cell
     if not rest:
-        return shares
+        return cells
     free = [
-        Share(group.stops, group.stops[stop])
+        PartitionCell(group.stops, group.stops[stop])
         for group, kept in zip(plan.groups, members, strict=True)
         for stop in _free_stops(graph, group, kept, rest, now, visited_at)
     ]
     from scipy.optimize import linear_sum_assignment
 
-    begins = [graph.index[share.stop] for share in free]
+    begins = [graph.index[cell.stop] for cell in free]
     seconds = graph.distances[np.ix_([graph.index[robot.place] for robot in rest], begins)]
     # Squares: one long way is worse than two of half its length.
-    for robot_number, share_number in zip(*linear_sum_assignment(seconds**2), strict=True):
-        shares[rest[robot_number].name] = free[share_number]
-    return shares
+    for robot_number, cell_number in zip(*linear_sum_assignment(seconds**2), strict=True):
+        cells[rest[robot_number].name] = free[cell_number]
+    return cells
 
 
 def _free_stops(
@@ -514,7 +514,7 @@ def _free_stops(
     if not kept:
         anchor = _anchor(graph, group, rest, now, visited_at)
         return [_stop_after(offsets, length, anchor + slot) for slot in slots]
-    taken = [float(offsets[group.position[robot.share.stop]]) for robot in kept if robot.share]
+    taken = [float(offsets[group.position[robot.cell.stop]]) for robot in kept if robot.cell]
     slots = taken[0] + slots
     left = list(range(1, group.robots))
     for offset in taken[1:]:
@@ -556,13 +556,13 @@ def _apart(first: float, second: float, length: float) -> float:
     return min(around, length - around)
 
 
-def _group(assignment: Assignment, share: Share) -> Group:
+def _group(assignment: Assignment, cell: PartitionCell) -> Group:
     assert assignment.plan is not None
-    return next(group for group in assignment.plan.groups if group.stops == share.tour)
+    return next(group for group in assignment.plan.groups if group.stops == cell.tour)
 
 
-def _next(group: Group, stop: str) -> Share:
-    return Share(group.stops, group.stops[(group.position[stop] + 1) % len(group.stops)])
+def _next(group: Group, stop: str) -> PartitionCell:
+    return PartitionCell(group.stops, group.stops[(group.position[stop] + 1) % len(group.stops)])
 
 
 def _mine(
@@ -570,7 +570,7 @@ def _mine(
     assignment: Assignment,
     robots: Sequence[FleetRobot],
     me: FleetRobot,
-    onward: Share,
+    onward: PartitionCell,
 ) -> frozenset[str]:
     """Return the stops that no other robot of the group comes to before this one.
 
@@ -580,10 +580,10 @@ def _mine(
     since = {robot.name: (robot.since, robot.name) for robot in robots}
     here, length = group.position[onward.stop], len(group.stops)
     gap = length
-    for name, share in assignment.shares.items():
-        if name == me.name or share.tour != group.stops:
+    for name, cell in assignment.cells.items():
+        if name == me.name or cell.tour != group.stops:
             continue
-        ahead = (group.position[share.stop] - here) % length
+        ahead = (group.position[cell.stop] - here) % length
         if ahead == 0 and since[me.name] < since[name]:
             continue
         gap = min(gap, ahead)
@@ -607,7 +607,7 @@ def _hold(
     here = float(group.offsets[group.position[me.place]]) + group.charge_at(me.place)
     nearest, ahead = math.inf, ''
     for robot in robots:
-        theirs = assignment.shares.get(robot.name)
+        theirs = assignment.cells.get(robot.name)
         if robot.name == me.name or theirs is None or theirs.tour != group.stops:
             continue
         number = group.position[theirs.stop]
@@ -659,7 +659,7 @@ def _slot(
                 continue
             left = max(0.0, robot.charging_until - now)
             needs.append(ChargeNeed(robot.name, now, left, robot.dock))
-        elif robot.runs_until is not None and robot.name in assignment.shares:
+        elif robot.runs_until is not None and robot.name in assignment.cells:
             needs.append(ChargeNeed(robot.name, robot.runs_until, robot.charge_seconds))
     slot = dock_slots(needs, docks, now)[me.name]
     here, there, dock = (graph.index[place] for place in (me.place, stop, slot.dock))
@@ -678,15 +678,13 @@ def _why(
     """Return why a stop is a robot's, in words."""
     for robot in robots:
         if (
-            robot.share is not None
+            robot.cell is not None
             and robot.name in assignment.absent
-            and stop in robot.share.tour
+            and stop in robot.cell.tour
             and robot.name != name
         ):
             return f'{stop} is mine: {assignment.absent[robot.name]}'
-    others = sorted(
-        other for other, share in assignment.shares.items() if share.tour == group.stops
-    )
+    others = sorted(other for other, cell in assignment.cells.items() if cell.tour == group.stops)
     others.remove(name)
     with_whom = ' and '.join(others) if len(others) < 4 else f'{len(others)} others'
     shared = f', shared with {with_whom}' if others else ''

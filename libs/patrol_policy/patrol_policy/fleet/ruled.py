@@ -42,6 +42,6 @@ def ruled(
         found = decide(world, Battery(), settings)
         place = found.slot.dock if found.rule == RECHARGE and found.slot else found.place
         until = view.now + found.stay if found.stay else None
-        return FleetChoice(place, until, found.share, found.reason, found.slot)
+        return FleetChoice(place, until, found.cell, found.reason, found.slot)
 
     return choose_place

@@ -192,7 +192,7 @@ class FleetPatrol:
             # It is back, and begins anew where it stands.
             self._failed.discard(name)
             robot = self.robots[name] = replace(
-                robot, heard_since=self.now, since=self.now, share=None
+                robot, heard_since=self.now, since=self.now, cell=None
             )
         if self._ahead[name]:
             place = self._ahead[name].pop(0)
@@ -241,7 +241,7 @@ class FleetPatrol:
         view = FleetView(self.graph, self.robots, self.visited_at, self.now, self.settings)
         choice = self.policy(view, name)
         self.decisions.append((self.now, name, choice))
-        changes = replace(self.robots[name], share=choice.share or self.robots[name].share)
+        changes = replace(self.robots[name], cell=choice.cell or self.robots[name].cell)
         if choice.slot is not None:
             longest = (
                 choice.slot.end - choice.slot.begin
