@@ -3,9 +3,9 @@
 
     .venv/bin/python benchmarks/nav2/drives.py [--quick] [--minutes 20] [--rounds 1] [--in-turn]
         [--sides nav2,own] [--faults door,person,kidnap,slip,lidar] [--place FILE] [--physics]
-        [--faults late,inactive,kill,goal,planner,box,pose,lost,map,zones,undock]
-        [--namespace robot1] [--tf-only] [--docking] [--controller rpp|mppi] [--no-monitor]
-        [--nav2 PREFIX[:PREFIX]] [--params nav2_params.yaml]
+        [--faults late,inactive,kill,goal,planner,box,pose,lost,map]
+        [--namespace robot1] [--tf-only] [--zones] [--docking] [--controller rpp|mppi]
+        [--no-monitor] [--nav2 PREFIX[:PREFIX]] [--params nav2_params.yaml]
 
 Needs Nav2 for Jazzy: `sudo apt install ros-jazzy-navigation2 ros-jazzy-nav2-bringup`, or what
 `benchmarks/nav2/build.sh` builds, and its messages (`python3 launch.py setup --with nav2`). Each
@@ -13,7 +13,8 @@ side has a robot of its own, which speaks as a foreign one (`foreign_robot.py`),
 its own. The sides drive at the same time, so that they have the same machine, or in turn.
 
 Faults happen one after the other in one mission. A visit counts where the robot really is in the
-place; a fault is recovered from when there were two such visits after it began.
+place; a fault is recovered from when there were two such visits after it began. How long that
+takes depends on where the next places are; so what the robot did meanwhile is told, too.
 """
 
 from __future__ import annotations
@@ -39,8 +40,10 @@ from nav2.stack import Nav2Stack, built_here, children_of, prefixes, usage
 from sizes import sized_parser, skip
 
 from floor_plans import read_place
+from floor_plans.filter_masks import write_filter_masks
 from floor_plans.occupancy_map import write_map
 from surveillance_runtime.profile import read_profile
+from surveillance_runtime.testing import claim_domain
 from surveillance_simulation.world.simulated_place import read_simulated_place
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -48,6 +51,8 @@ NAVIGATION = ('motion_controller', 'planner_controller', 'collision_monitor')
 """Our nodes that do what Nav2 does. A process counts whole that runs one of them."""
 SPEED = 0.5
 """Full speed of both, m/s."""
+STANDS = 0.02
+"""It drives when it is faster, m/s; a turn on the spot is no drive."""
 PATIENCE = 300.0
 """A mission that makes no two visits in this time after a fault is lost, seconds."""
 DOOR_CLOSED = 60.0
@@ -65,6 +70,14 @@ battery: {source: model}
 dock: {navigator: NAVIGATOR, docking: DOCKING}
 arm: none
 """
+
+ZONES = """\
+    keep_out_zones:
+      stairs: [8.5, 8.6, 9.5, 8.6, 9.5, 10.0, 8.5, 10.0]
+    slow_zones:
+      shop: [0.25, 7.0, 10.0, 12.5, 10.0, 12.5, 14.5, 7.0, 14.5]
+"""
+"""In the corridors of the seven rooms, where the robot passes often."""
 
 
 class Side:
@@ -234,6 +247,14 @@ class Side:
         told = self.events('visit', self.began)
         ways = list(pairwise(visits))
         straight = sum(math.dist(a['pose'][:2], b['pose'][:2]) for a, b in ways) / SPEED
+        zones = self.world.plan.zones
+        if zones.keep_out:
+            barred = sum(zones.barred(each['pose']) is not None for each in trace)
+            found['lines of the trace kept out of'] = barred
+        for zone in zones.slow.values():
+            speeds = sorted(e['speed'] for e in trace if zone.contains(e['pose'][:2])[0])
+            if speeds:
+                found[f'95 % in {zone.speed} m/s, m/s'] = speeds[len(speeds) * 95 // 100]
         wrong = [
             math.dist(each['pose'][:2], each['believed'][:2]) for each in trace if each['believed']
         ]
@@ -242,6 +263,11 @@ class Side:
             'arrivals': len(visits),
             'false arrivals': len(told) - len(visits),
             'failures': len(self.events('failure', self.began)),
+            'doubts of the pose': sum(
+                'does not fit' in each['text']
+                for each in self.events('incident', self.began)
+                if each['phase'] == 'begin'
+            ),
             'contacts': trace[-1]['contacts'] - trace[0]['contacts'],
             'way, m': trace[-1]['way'] - trace[0]['way'],
             'time over the straight line': sum(b['at'] - a['at'] for a, b in ways) / straight
@@ -543,6 +569,13 @@ FAULTS = {
 NAV2_ALONE = set(FAULTS) - {'door', 'person', 'kidnap', 'slip', 'lidar'}
 
 
+def with_zones(place: Path, folder: Path) -> Path:
+    """Write the seven rooms with a zone to keep out of and a slow one."""
+    written = folder / place.name
+    written.write_text(f'{place.read_text("utf-8").rstrip()}\n{ZONES}', 'utf-8')
+    return written
+
+
 def drive(side: Side) -> dict[str, float]:
     """Drive one side for the asked time; return its figures."""
     try:
@@ -593,7 +626,26 @@ def after(side: Side, fault: str) -> str:
             text = event['text'][:150]
             said[text] = said.get(text, 0) + 1
     words = '; '.join(f'{text} ({count} x)' for text, count in said.items())
-    return f'{told}, {failures} failures, {false} false visits, {hit} contacts; said: {words}'
+    return (
+        f'{told}, {failures} failures, {false} false visits, {hit} contacts, '
+        f'{what_it_did(side, began)}; said: {words}'
+    )
+
+
+def what_it_did(side: Side, began: float) -> str:
+    """Return what does not depend on where the next places are, since a time."""
+    trace = [each for each in side.trace() if each['at'] >= began]
+    steps = [(b['at'] - a['at'], a['speed']) for a, b in pairwise(trace)]
+    stood = longest = at_once = 0.0
+    for seconds, speed in steps:
+        at_once = at_once + seconds if abs(speed) < STANDS else 0.0
+        stood, longest = stood + seconds * (at_once > 0.0), max(longest, at_once)
+    wrong = [math.dist(e['pose'][:2], e['believed'][:2]) for e in trace if e['believed']]
+    return (
+        f'{len(side.visits(began))} visits in {trace[-1]["at"] - began:.0f} s, '
+        f'stood {stood:.0f} s of it (at most {longest:.1f} s), '
+        f'pose wrong by at most {max(wrong, default=math.nan):.2f} m'
+    )
 
 
 def main() -> int:
@@ -610,12 +662,14 @@ def main() -> int:
     parser.add_argument('--params', type=Path, help="nav2_params.yaml of Nav2's bringup")
     parser.add_argument('--namespace', default='', help='of the robot and all its nodes')
     parser.add_argument('--tf-only', action='store_true', help='odometry by tf alone')
+    parser.add_argument(
+        '--zones', action='store_true', help="keep-out and slow zones, by Nav2's costmap filters"
+    )
     parser.add_argument('--docking', action='store_true', help="Nav2's docking server docks")
     parser.add_argument(
         '--no-monitor', action='store_true', help="without Nav2's collision monitor"
     )
     parser.add_argument('--physics', action='store_true', help='MuJoCo moves the robot')
-    parser.add_argument('--domain', type=int, default=87)
     parser.add_argument('--keep', type=Path, help='folder for logs and recordings')
     options = parser.parse_args()
     options.installed = prefixes(options.nav2) or prefixes(built_here())
@@ -629,13 +683,20 @@ def main() -> int:
             skip('no nav2_params.yaml: apt install ros-jazzy-nav2-bringup, or --params FILE')
     options.minutes = options.minutes or options.size.of(20.0, 2.0, 0.2)
     folder = options.keep or Path(tempfile.mkdtemp(prefix='nav2-beside-'))
+    folder.mkdir(parents=True, exist_ok=True)
+    options.masks = None
+    if options.zones:
+        options.place = with_zones(options.place, folder)
+        options.masks = folder / 'masks'
+        plan = read_place(options.place).plan
+        assert plan is not None
+        write_filter_masks(plan, options.masks)
     threads = 1 if options.in_turn else len(sides)
     begun = os.getloadavg()[0]
     with ThreadPoolExecutor(threads) as pool:
         for number in range(options.rounds):
             runs = [
-                Side(name, options, folder / f'{name}{number}', options.domain + index)
-                for index, name in enumerate(sides)
+                Side(name, options, folder / f'{name}{number}', claim_domain()) for name in sides
             ]
             if options.faults:
                 list(pool.map(lambda side: suffer(side, options.faults.split(',')), runs))

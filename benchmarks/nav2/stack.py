@@ -12,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from floor_plans.filter_masks import PARAMETERS
 from surveillance_runtime.profile import RobotProfile
 from surveillance_runtime.profile.nav2_parameters import laid_over
 
@@ -31,6 +32,8 @@ CHAIN = ('velocity_smoother', 'collision_monitor')
 """Between the controller and the base."""
 MANAGED = 'localization', 'navigation'
 """What each of the two lifecycle managers brings up."""
+NAMED = 'nav2_lifecycle_manager', 'nav2_amcl', 'nav2_map_server'
+"""Packages whose nodes are told their names."""
 LOCALIZERS = ('map_server', 'amcl')
 RPP = {
     'plugin': 'nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController',
@@ -68,13 +71,23 @@ def prefixes(given: str) -> list[Path]:
     return found if has_it else []
 
 
+def lay(over: dict[str, Any], values: dict[str, Any]) -> None:
+    """Lay a tree of values over another one."""
+    for key, value in over.items():
+        if isinstance(value, dict) and isinstance(values.get(key), dict):
+            lay(value, values[key])
+        else:
+            values[key] = value
+
+
 class Nav2Stack:
     """Nav2's servers and their lifecycle managers.
 
     Args:
         options: Of the command line: the prefixes, nav2_params.yaml that the profile is laid over,
             the controller (rpp, or mppi as the file has it), the namespace, whether the docking
-            server and the collision monitor are started.
+            server and the collision monitor are started, and the folder of the masks of its
+            costmap filters, None without.
         profile: The robot.
         map_file: The map in map_server's format.
         folder: Where parameters and logs go.
@@ -94,6 +107,13 @@ class Nav2Stack:
         self._chained = set(CHAIN) <= {row[2] for row in self._there} and not options.no_monitor
         if not self._chained:
             self._there = [row for row in self._there if row[2] not in CHAIN]
+        filters: dict[str, Any] = {}
+        if options.masks is not None:
+            filters = yaml.safe_load((options.masks / PARAMETERS).read_text('utf-8'))
+            for name in filters:
+                if name.endswith('_server') and name != 'controller_server':
+                    program = 'map_server' if 'mask' in name else 'costmap_filter_info_server'
+                    self._there.append(('nav2_map_server', program, name))
         nodes = [row[2] for row in self._there]
         merged = laid_over(yaml.safe_load(options.params.read_text('utf-8')), profile)
         if options.controller == 'rpp':
@@ -105,6 +125,7 @@ class Nav2Stack:
         dock = {'dock_plugins': ['simple_charging_dock'], 'simple_charging_dock': DOCK}
         dock['base_frame'] = profile.frames.base
         merged['docking_server']['ros__parameters'] |= dock
+        lay(filters, merged)
         for name, members in (
             ('lifecycle_manager_localization', [n for n in nodes if n in LOCALIZERS]),
             ('lifecycle_manager_navigation', [n for n in nodes if n not in LOCALIZERS]),
@@ -156,9 +177,7 @@ class Nav2Stack:
         path = self._program(package, program)
         assert path is not None, program
         words = [str(path), '--ros-args', '--params-file', str(self._parameters)]
-        words += (
-            ['-r', f'__node:={node}'] if package in ('nav2_lifecycle_manager', 'nav2_amcl') else []
-        )
+        words += ['-r', f'__node:={node}'] if package in NAMED else []
         if self._space:
             words += ['-r', f'__ns:=/{self._space}', '-r', '/tf:=tf', '-r', '/tf_static:=tf_static']
         if self._chained and node in ('controller_server', 'behavior_server', 'velocity_smoother'):

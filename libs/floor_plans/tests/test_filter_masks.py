@@ -46,3 +46,28 @@ def test_nav2_reads_the_same_zones_from_the_masks(tmp_path: Path) -> None:
     found = slow.at(slow.cells, 15.0, 12.0) * info['multiplier'] + info['base']
     assert found == pytest.approx(0.3, abs=0.003)
     assert slow.at(slow.cells, 10.0, 12.0) == 0, 'no limit'
+
+
+def test_servers_and_costmaps_name_the_same_topics_wherever_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The costmaps' nodes have namespaces of their own, and map_server starts in any folder."""
+    plan = read_place(
+        place_with(tmp_path, keep_out_zones={'S': SQUARE}, slow_zones={'A': SHOP})
+    ).plan
+    monkeypatch.chdir(tmp_path)
+    given = yaml.safe_load(write_filter_masks(plan, Path('masks'))[-1].read_text())
+    costmaps = {
+        name: given[name][name]['ros__parameters'] for name in ('global_costmap', 'local_costmap')
+    }
+    assert costmaps['global_costmap']['filters'] == ['keepout_filter', 'speed_filter']
+    assert costmaps['local_costmap']['filters'] == ['keepout_filter']
+    for kind in ('keepout', 'speed'):
+        server = given[f'{kind}_filter_mask_server']['ros__parameters']
+        info = given[f'{kind}_costmap_filter_info_server']['ros__parameters']
+        heard = costmaps['global_costmap'][f'{kind}_filter']['filter_info_topic']
+        assert info['filter_info_topic'] == heard
+        assert info['mask_topic'] == server['topic_name']
+        assert heard.startswith('/')
+        assert info['mask_topic'].startswith('/')
+        assert Path(server['yaml_filename']) == tmp_path / 'masks' / f'{kind}_mask.yaml'
