@@ -426,6 +426,8 @@ class CollisionMonitor(PatrolNode):
                 f'; the base is not protected: let it take its commands from {self._base.topic}, '
                 'instead of from those that are not looked at'
             )
+        if not lines:
+            return  # discovery has not told all yet
         self.incidents.begin(BASE_CAUSE, lines)
 
 

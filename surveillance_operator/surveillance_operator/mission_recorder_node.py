@@ -46,6 +46,8 @@ DRAIN_PERIOD, SEAL_PERIOD, STATE_PERIOD = 0.15, 0.6, 0.4
 PRUNE_PERIOD = 60.0
 RETRY_PERIOD = 3.0
 """Seconds after which a recording that could not be written is tried again."""
+BASE_COMMAND = 'cmd_vel_monitored'
+"""What the base hears, before a run's remappings."""
 OWN = 'surveillance_interfaces/'
 DISK_FULL = errno.ENOSPC, errno.EDQUOT
 QUEUE = 2000
@@ -187,6 +189,15 @@ class MissionRecorder(PatrolNode):
                 kind = next((each for each in types if each.startswith(OWN)), types[0])
                 self._follow(topic, kind, offers)
 
+    def _name_of(self, topic: str) -> str:
+        """Return by which name this node subscribes to a topic: the run's remappings count for it,
+        too, and `cmd_vel` of a robot may be the name of what the base hears.
+        """
+        for name in (topic, BASE_COMMAND):
+            if self.resolve_topic_name(name) == topic:
+                return name
+        return topic
+
     def _look_for_clashes(self, topics: Sequence[str]) -> None:
         """Tell of topics that have more than one type, and of those that have not any more."""
         clashes = type_clashes(endpoints_of(self, topics)) if topics else {}
@@ -214,7 +225,8 @@ class MissionRecorder(PatrolNode):
             self._bag.add_topic(
                 TopicType(topic, kind, definition(kind), reliable, latched, depth, type_hash)
             )
-            subscription = PolledSubscription(self, message_class(kind), topic, qos, raw=True)
+            name = self._name_of(topic)
+            subscription = PolledSubscription(self, message_class(kind), name, qos, raw=True)
         except (ValueError, ImportError, AttributeError, _rclpy.RCLError) as error:
             # A type that is not installed here, or a second one on a topic: the middleware refuses
             # that to a process that has the other already.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -223,3 +224,17 @@ def test_a_hand_comes_before_all_others_and_is_limited_alike(graph: Any) -> None
     graph.until(lambda: passes(3.0, held=True) == 0.2)
     # Who lets go gives the robot back.
     graph.until(lambda: passes(3.0, held=False) == 0.5)
+
+
+def test_of_a_base_whose_type_is_not_known_yet_nothing_is_told(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monitor = graph.add(CollisionMonitor)
+    unknown = [SimpleNamespace(topic_type='')]
+    monkeypatch.setattr(monitor, 'get_subscriptions_info_by_topic', lambda _topic: unknown)
+    begun: list[str] = []
+    monkeypatch.setattr(monitor.incidents, 'begin', lambda _cause, text: begun.append(text))
+    for name in ('findings', 'endpoints_of'):
+        monkeypatch.setattr(collision_monitor_node, name, lambda *_: ())
+    monitor._look_for_base()
+    assert begun == []

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import OccupancyGrid
 from PIL import Image as PictureFile
 from rclpy.serialization import deserialize_message
@@ -67,6 +68,22 @@ def test_every_message_comes_back_as_it_was_published(graph: Any, tmp_path: Path
             if connection.topic == '/follow_path/_action/feedback':
                 assert read.feedback.position.x == 2.5
     assert Timeline(timeline).at(1e12)[2]['decision']['place'] == 'R3'
+
+
+def test_what_the_base_hears_is_recorded_where_its_topic_has_the_name_of_what_is_wanted(
+    graph: Any, tmp_path: Path
+) -> None:
+    folder = tmp_path / 'recording'
+    base = graph.node.create_publisher(TwistStamped, 'cmd_vel', 1)
+    wanted = graph.node.create_publisher(Twist, 'cmd_vel_wanted', 1)
+    renamed = ['-r', 'cmd_vel:=cmd_vel_wanted', '-r', 'cmd_vel_monitored:=cmd_vel']
+    recorder = graph.add(
+        MissionRecorder,
+        parameters={'folder': str(folder)},
+        cli_args=['--ros-args', *renamed],
+    )
+    graph.until(lambda: base.get_subscription_count() and wanted.get_subscription_count())
+    assert recorder._bag._topics.keys() >= {'/cmd_vel', '/cmd_vel_wanted'}
 
 
 def test_a_full_disk_is_waited_for(
