@@ -523,7 +523,7 @@ class Query(ClientPart):
     axioms = directive('QUERY AXIOMS', _name, _texts)
     rules = directive('QUERY RULES', _nothing, _texts)
     unsupported = directive('QUERY UNSUPPORTED', _nothing, _texts)
-    taken_back = directive('QUERY TAKEN BACK', _nothing, _texts)
+    rolled_back = directive('QUERY TAKEN BACK', _nothing, _texts)
     explain_inconsistency = directive('QUERY EXPLAIN INCONSISTENCY', _nothing, _explanation)
 
 

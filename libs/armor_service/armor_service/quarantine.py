@@ -29,7 +29,7 @@ KEPT = 100
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Submission:
     """What one client's directive changes.
 
     Attributes:
@@ -66,7 +66,7 @@ class Quarantine:
         died_at: Over which of `untested`, or `WHOLE`.
     """
 
-    untested: list[Told] = field(default_factory=list)
+    untested: list[Submission] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
     count: int = 0
     origin: tuple[Axiom, ...] = ()
@@ -93,7 +93,7 @@ class Quarantine:
         new = self.count - count
         return '; '.join(self.lines[-new:]) if new else ''
 
-    def take_back(
+    def roll_back(
         self, kb: KnowledgeBase, reason: Callable[[int], None], problem: str
     ) -> tuple[list[str], list[Change]]:
         """Find the changes over which reasoning takes too long, and go on without them.
@@ -119,7 +119,7 @@ class Quarantine:
                     if not derived:
                         net[axiom] = net.get(axiom, 0) + step
 
-        taken: list[tuple[Told, str]] = []
+        taken: list[tuple[Submission, str]] = []
         unsubscribe = kb.subscribe(note)
         try:
             self._go_back(kb)
@@ -156,7 +156,7 @@ class Quarantine:
         self,
         kb: KnowledgeBase,
         reason: Callable[[int], None],
-        told: Told,
+        told: Submission,
         place: int,
         problem: str,
     ) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from armor_service.changes import Change, RemoveAxiom, RemoveEntity, RenameEntity, apply_all
 from armor_service.protocol import DirectiveError
-from armor_service.quarantine import WHOLE, Quarantine, Told, TooHardError
+from armor_service.quarantine import WHOLE, Quarantine, Submission, TooHardError
 from armor_service.rendering import render_entity, shown
 from owl_reasoner.knowledge_base import KnowledgeBase
 from owl_reasoner.owl.axiom_text import axiom_text
@@ -100,14 +100,14 @@ class Buffering:
 
     manipulation: bool = False
     reasoner: bool = False
-    waiting: list[Told] = field(default_factory=list)
+    waiting: list[Submission] = field(default_factory=list)
 
     @property
     def queue(self) -> list[Change]:
         """The changes that wait, oldest first."""
         return [change for told in self.waiting for change in told.changes]
 
-    def take(self) -> list[Told]:
+    def take(self) -> list[Submission]:
         """Hand out what waits."""
         taken, self.waiting = self.waiting, []
         return taken
@@ -161,7 +161,7 @@ class Reference:
         on_reasoning: Told over which of the untested changes is reasoned, or `WHOLE`; and None at
             the end.
         on_completed: Told that the derived facts are up to date.
-        on_taken_back: Told what is taken back, one line each, and the changes that undo it.
+        on_rolled_back: Told what is taken back, one line each, and the changes that undo it.
     """
 
     name: str
@@ -177,10 +177,10 @@ class Reference:
     revision: int = 0
     dropped: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
-    on_applied: Callable[[list[Told]], None] = lambda _: None
+    on_applied: Callable[[list[Submission]], None] = lambda _: None
     on_reasoning: Callable[[int | None], None] = lambda _: None
     on_completed: Callable[[], None] = lambda: None
-    on_taken_back: Callable[[list[str], list[Change]], None] = lambda *_: None
+    on_rolled_back: Callable[[list[str], list[Change]], None] = lambda *_: None
 
     @contextlib.contextmanager
     def held(self) -> Iterator[KnowledgeBase]:
@@ -202,7 +202,7 @@ class Reference:
             with contextlib.suppress(TooHardError):
                 self._derive()
 
-    def submit(self, told: Told) -> str:
+    def submit(self, told: Submission) -> str:
         """Take changes in, at once or into the queue, as the reference is set up.
 
         Returns:
@@ -304,7 +304,7 @@ class Reference:
         """Tell whether a client may change the reference or mount on it."""
         return self.mounted in (NOBODY, client)
 
-    def _apply(self, told: list[Told]) -> None:
+    def _apply(self, told: list[Submission]) -> None:
         apply_all(self.kb, (change for one in told for change in one.changes))
         self.quarantine.untested += told
         self.revision += 1
@@ -327,14 +327,14 @@ class Reference:
         begin = time.thread_time()
         try:
             if self.quarantine.is_given_up and timeout == math.inf:
-                self._take_back(self.quarantine.ends)
+                self._roll_back(self.quarantine.ends)
             else:
                 self._reason(WHOLE, timeout)
         except ReasoningBudgetError as error:
             self.revision += 1
             if error.limit == 'cancelled' or timeout < math.inf:
                 raise TooHardError(str(error)) from None
-            self._take_back(str(error))
+            self._roll_back(str(error))
         self.effort.took = time.thread_time() - begin
         self.effort.base = self.effort.base or self.effort.took
         self.quarantine.completed()
@@ -353,7 +353,7 @@ class Reference:
         finally:
             self.on_reasoning(None)
 
-    def _take_back(self, problem: str) -> None:
+    def _roll_back(self, problem: str) -> None:
         """Find the changes over which reasoning takes too long, and go on without them.
 
         Raises:
@@ -365,10 +365,10 @@ class Reference:
             self.too_hard = problem
             raise TooHardError(problem)
         try:
-            lines, undo = self.quarantine.take_back(self.kb, self._reason, problem)
+            lines, undo = self.quarantine.roll_back(self.kb, self._reason, problem)
         except ReasoningBudgetError as error:
             self.too_hard = '' if error.limit == 'cancelled' else str(error)
             raise TooHardError(str(error)) from None
         finally:
             self.revision += 1
-        self.on_taken_back(lines, undo)
+        self.on_rolled_back(lines, undo)

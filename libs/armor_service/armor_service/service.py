@@ -28,7 +28,7 @@ from armor_service.protocol import (
     ListResponse,
     StoreError,
 )
-from armor_service.quarantine import Told, TooHardError
+from armor_service.quarantine import Submission, TooHardError
 from armor_service.reference import Reference
 from armor_service.rendering import one_line, shown
 from armor_service.store.store import Store
@@ -192,7 +192,7 @@ class ArmorService:
             return remark
         changes: list[Change] = directive.run(ref, *self._values(directive, request, ref))
         doubts = self._doubts(request, ref, changes)
-        told = Told(request.client_name, self._clock(), tuple(changes))
+        told = Submission(request.client_name, self._clock(), tuple(changes))
         ref.effort.heavy |= directive.schema
         remark = '; '.join(filter(None, (ref.missing(changes), *doubts)))
         if not changes:

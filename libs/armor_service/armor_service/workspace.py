@@ -114,14 +114,14 @@ class Workspace:
             if not ref.dropped:
                 self.tell(ref.name, changes)
 
-        taken_back = ref.on_taken_back
+        rolled_back = ref.on_rolled_back
 
-        def on_taken_back(lines: list[str], undo: list[Change]) -> None:
-            taken_back(lines, undo)
+        def on_rolled_back(lines: list[str], undo: list[Change]) -> None:
+            rolled_back(lines, undo)
             for line in lines:
                 self.warn(f'{ref.name}: taken back: {line}')
 
-        ref.effort.limits, ref.on_taken_back = self.limits, on_taken_back
+        ref.effort.limits, ref.on_rolled_back = self.limits, on_rolled_back
         ref.kb.subscribe(on_changes)
         self.references.add(ref)
         self.tell(ref.name, None)

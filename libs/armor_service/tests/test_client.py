@@ -135,7 +135,7 @@ def test_every_method_sends_what_armor_expects() -> None:
         'QUERY IND EXPRESSION': (lambda: ask.ind_b2_expression('A and B'), ('A and B',)),
         'QUERY AXIOMS': (lambda: ask.axioms('A'), ('A',)),
         'QUERY RULES': (lambda: ask.rules(), ()),
-        'QUERY TAKEN BACK': (lambda: ask.taken_back(), ()),
+        'QUERY TAKEN BACK': (lambda: ask.rolled_back(), ()),
         'QUERY EXPLAIN ABSENCE': (lambda: ask.explain_absence('A(a)'), ('A(a)',)),
         'QUERY EXPLAIN INCONSISTENCY': (lambda: ask.explain_inconsistency(), ()),
         'ADD AXIOM': (lambda: change.add_axiom('Class: A'), ('Class: A',)),

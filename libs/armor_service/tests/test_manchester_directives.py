@@ -179,7 +179,7 @@ def test_the_client_has_methods_for_them(service: ArmorService) -> None:
     assert change.close_class('URGENT', 'Robot1')
     assert any('not' in axiom for axiom in ask.axioms('Robot1'))
     assert change.remove_axiom('Individual: Robot1 Types: not URGENT')
-    assert ask.taken_back() == []
+    assert ask.rolled_back() == []
     client.utils.cancel()
     assert client.utils.reason_within(60.0)
 

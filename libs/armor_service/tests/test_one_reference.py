@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from armor_service import registry as registry_module
 from armor_service.changes import AddAxiom, Change, RemoveAxiom, RemoveEntity, RenameEntity
 from armor_service.protocol import DirectiveError
-from armor_service.quarantine import Quarantine, Told, TooHardError
+from armor_service.quarantine import Quarantine, Submission, TooHardError
 from armor_service.reference import (
     LONG_BACKLOG,
     NOBODY,
@@ -72,8 +72,8 @@ def made(*present: Axiom, **settings: Any) -> tuple[Reference, Hard]:
     return Reference('map', kb, Origin('', ''), **{'effort': Effort(base=2.0), **settings}), kb
 
 
-def told(*changes: Change, client: str = 'me', time: float = 0.0) -> Told:
-    return Told(client, time, changes)
+def told(*changes: Change, client: str = 'me', time: float = 0.0) -> Submission:
+    return Submission(client, time, changes)
 
 
 def test_what_reasoning_may_take_grows_with_the_ontology_and_the_changes() -> None:
@@ -115,7 +115,7 @@ def test_only_the_directives_that_are_too_hard_are_taken_back(
     ref.buffering.reasoner = True
     undone: list[tuple[list[str], list[Change]]] = []
     completed: list[bool] = []
-    ref.on_taken_back = lambda lines, undo: undone.append((lines, undo))
+    ref.on_rolled_back = lambda lines, undo: undone.append((lines, undo))
     ref.on_completed = lambda: completed.append(True)
     every = [told(*changes, client=f'c{number}') for number, changes in enumerate(directives)]
 
@@ -133,7 +133,7 @@ def test_only_the_directives_that_are_too_hard_are_taken_back(
     for each in every:
         assert ref.submit(each) == ''
         whole = after(whole, each.changes)
-    kept, gone = whole, list[Told]()
+    kept, gone = whole, list[Submission]()
     if is_hard(whole):
         kept = base
         for each in every:

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from armor_service.changes import AddAxiom
-from armor_service.quarantine import Told
-from armor_service.store.records import told_of
+from armor_service.quarantine import Submission
+from armor_service.store.records import submission_of
 from armor_service.store.spill import Spill
 from owl_reasoner.owl.axioms import ClassAssertion
 
-FIRST, SECOND = (Told('c', 1.0, (AddAxiom(ClassAssertion('#Room', name)),)) for name in '12')
+FIRST, SECOND = (Submission('c', 1.0, (AddAxiom(ClassAssertion('#Room', name)),)) for name in '12')
 STATE = {'mounted': 'c'}
 
 
@@ -23,7 +23,7 @@ def test_each_directive_is_kept_once_and_what_was_merged_is_not_read(tmp_path: P
     spill.keep([FIRST, SECOND], STATE, [])
     spill.close()
     again, notes = Spill(spill.path), list[str]()
-    found = [told_of(*one) for told, _, _ in again.read(0, notes) for one in told]
+    found = [submission_of(*one) for told, _, _ in again.read(0, notes) for one in told]
     assert found == [FIRST, SECOND]
     assert again.number == spill.number == 2
     assert len(list(again.read(1, notes))) == 1
@@ -44,7 +44,7 @@ def test_what_could_not_be_kept_is_kept_with_the_next(
     spill.keep([FIRST, SECOND], STATE, [])
     spill.close()
     ((told, state, waiting),) = Spill(spill.path).read(0, [])
-    assert [told_of(*one) for one in told] == [FIRST, SECOND]
+    assert [submission_of(*one) for one in told] == [FIRST, SECOND]
     assert (state, waiting) == (STATE, [])
 
 

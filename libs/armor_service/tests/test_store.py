@@ -21,7 +21,7 @@ import pytest
 from armor_service.access import Settings
 from armor_service.changes import AddAxiom, RemoveEntity, RenameEntity
 from armor_service.protocol import DirectiveRequest, StoreError
-from armor_service.quarantine import Quarantine, Told
+from armor_service.quarantine import Quarantine, Submission
 from armor_service.reference import Buffering, Origin, Reference
 from armor_service.service import ArmorService
 from armor_service.store import store as store_module
@@ -618,7 +618,7 @@ def test_a_reference_is_as_it_was(tmp_path: Path) -> None:
     assert store.recover() == []
     ref = reference()
     store.loaded(ref)
-    waits = Told('you', 7.0, (RenameEntity('individual', f'{IRI}#a', f'{IRI}#b'),))
+    waits = Submission('you', 7.0, (RenameEntity('individual', f'{IRI}#a', f'{IRI}#b'),))
     ref.buffering.waiting.append(waits)
     store.commit(ref)
     store.close()
@@ -643,7 +643,8 @@ def test_what_was_not_reasoned_over_is_known_after_the_death_with_what_was_befor
     store.loaded(ref)
     before = set(ref.kb.axioms())
     told = [
-        Told('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#{name}')),)) for name in 'ab'
+        Submission('you', 7.0, (AddAxiom(ClassAssertion(f'{IRI}#K', f'{IRI}#{name}')),))
+        for name in 'ab'
     ]
     for one in told:
         ref.submit(one)

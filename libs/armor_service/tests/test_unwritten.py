@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armor_service.changes import AddAxiom, apply_all
-from armor_service.quarantine import Told
+from armor_service.quarantine import Submission
 from armor_service.reference import Buffering, Effort, Origin, Reference, knowledge_base
 from armor_service.store.unwritten import Unwritten
 from owl_reasoner.owl.axioms import ClassAssertion
@@ -38,7 +38,7 @@ def test_what_the_file_has_already_is_not_lacking() -> None:
 def test_a_directive_that_waits_is_done_again_after_what_others_wrote() -> None:
     ref, lacking = reference(), Unwritten()
     lacking.follow(ref)
-    told = Told('c', 0.0, (AddAxiom(SECOND),))
+    told = Submission('c', 0.0, (AddAxiom(SECOND),))
     apply_all(ref.kb, told.changes)
     lacking.applied([told])
     delta = lacking.merge(ref.kb, [AddAxiom(FIRST)], [])

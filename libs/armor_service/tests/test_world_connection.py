@@ -100,7 +100,7 @@ def test_a_file_that_was_taken_away_is_lost_and_one_without_bytes_is_empty(
 def test_a_copy_and_a_file_put_aside_hold_the_same(file: WorldConnection) -> None:
     copy = file.path.with_name('copy.sqlite3')
     file.backup(copy)
-    aside = file.put_aside('damaged-')
+    aside = file.quarantine('damaged-')
     assert axioms(copy) == axioms(aside) == [ROOM]
     assert not file.path.exists()
     quads, lost = file.salvage(aside)

@@ -291,7 +291,7 @@ def _unsupported(ref: Reference) -> DirectiveResponse:
     summary='The changes that were taken back because reasoning over them took too long or ended '
     'the process: what, whose, when and why, one line each.',
 )
-def _taken_back(ref: Reference) -> DirectiveResponse:
+def _rolled_back(ref: Reference) -> DirectiveResponse:
     return DirectiveResponse(
         queried_objects=list(ref.quarantine.lines), error_description=ref.too_hard
     )

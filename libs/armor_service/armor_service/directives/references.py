@@ -361,8 +361,8 @@ def _apply(ref: Reference) -> str:
     'with buffering. A change over which reasoning takes too long is taken back, and named.',
 )
 def _reason(ref: Reference, seconds: str) -> str:
-    if (taken_back := ref.reason(_seconds(seconds))) != '':
-        return f'taken back: {taken_back}'
+    if (rolled_back := ref.reason(_seconds(seconds))) != '':
+        return f'taken back: {rolled_back}'
     return ''
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from armor_service.changes import AddAxiom, RemoveAxiom, SetAssertion
-from armor_service.quarantine import Told
+from armor_service.quarantine import Submission
 from armor_service.reference import Reference
 from armor_service.store.assigned_numbers import assigned_numbers
 from armor_service.store.unwritten import Unwritten
@@ -44,7 +44,9 @@ class ForeignWrites:
         self._file, self._lacking, self._tell = file, lacking, tell
         self._others: set[int] = set()
 
-    def take(self, ref: Reference, ontology: WorldOntology, inferred: WorldOntology) -> Told | None:
+    def take(
+        self, ref: Reference, ontology: WorldOntology, inferred: WorldOntology
+    ) -> Submission | None:
         """Take in what others changed, in a transaction, and what waits to be written after it.
 
         Args:
@@ -78,7 +80,7 @@ class ForeignWrites:
         for change in changes:
             if isinstance(change, AddAxiom):
                 ontology.declare(change.axiom)
-        told = Told(FILE, time.time(), (*changes, *replacing))
+        told = Submission(FILE, time.time(), (*changes, *replacing))
         ref.quarantine.untested.append(told)
         self._lacking.groups.insert(0, ([told], delta))
         ref.revision += 1

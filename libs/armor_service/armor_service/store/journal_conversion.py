@@ -9,9 +9,9 @@ from typing import Any
 
 from armor_service.changes import apply_all
 from armor_service.protocol import StoreError
-from armor_service.quarantine import Quarantine, Told
+from armor_service.quarantine import Quarantine, Submission
 from armor_service.reference import Buffering, Effort, Origin, Reference, knowledge_base
-from armor_service.store.records import decode, entries, told_of
+from armor_service.store.records import decode, entries, submission_of
 from owl_reasoner.owl.axioms import Axiom
 
 _KINDS = frozenset({'axioms', 'mount', 'change', 'flush', 'buffer', 'taken back', 'past'})
@@ -54,7 +54,7 @@ def read_journal(directory: Path, notes: list[str]) -> list[Reference]:
     return found
 
 
-def put_journal_aside(directory: Path) -> str:
+def archive_journal(directory: Path) -> str:
     """Put a journal aside once its references are elsewhere; return in what folder, '' for none.
 
     Raises:
@@ -99,7 +99,7 @@ class _Replay:
         if what == 'load':
             settings, axioms, queue = rest
             self._load(name, settings, [decode(axiom) for axiom in axioms])
-            self.references[name].buffering.waiting = [told_of(*parts) for parts in queue]
+            self.references[name].buffering.waiting = [submission_of(*parts) for parts in queue]
             return
         if what == 'loaded':
             if name not in self.references:
@@ -122,7 +122,7 @@ class _Replay:
         elif what == 'mount':
             ref.mounted = rest[0]
         elif what == 'change':
-            told = told_of(*rest)
+            told = submission_of(*rest)
             if ref.buffering.manipulation:
                 ref.buffering.waiting.append(told)
             else:
@@ -162,7 +162,7 @@ class _Replay:
         waiting, ref.buffering.waiting = ref.buffering.waiting, []
         self._apply(ref, waiting)
 
-    def _apply(self, ref: Reference, told: list[Told]) -> None:
+    def _apply(self, ref: Reference, told: list[Submission]) -> None:
         if not ref.quarantine.untested:
             ref.quarantine.origin = tuple(ref.kb.axioms())
         ref.quarantine.untested += told

@@ -14,7 +14,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, get_args
 
 from armor_service.changes import Change
-from armor_service.quarantine import Told
+from armor_service.quarantine import Submission
 from owl_reasoner.owl import axioms, expressions
 from owl_reasoner.owl.expressions import Literal
 
@@ -68,18 +68,18 @@ def decode(value: Any) -> Any:
     return _RECORDS[tag](*decoded)
 
 
-def told_as_json(told: Told) -> list[Any]:
+def submission_as_json(told: Submission) -> list[Any]:
     """Turn what one client asked for into what JSON holds."""
     return [[encode(change) for change in told.changes], told.time, told.client]
 
 
-def told_of(changes: Iterable[Any], time: float = 0.0, client: str = '') -> Told:
-    """Undo `told_as_json`.
+def submission_of(changes: Iterable[Any], time: float = 0.0, client: str = '') -> Submission:
+    """Undo `submission_as_json`.
 
     Raises:
         ValueError: Not something that it made.
     """
-    return Told(client, time, tuple(decode(change) for change in changes))
+    return Submission(client, time, tuple(decode(change) for change in changes))
 
 
 TO_JSON = json.JSONEncoder(separators=(',', ':'))

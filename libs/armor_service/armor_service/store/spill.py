@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from armor_service.quarantine import Told
-from armor_service.store.records import entries, line_of, told_as_json
+from armor_service.quarantine import Submission
+from armor_service.store.records import entries, line_of, submission_as_json
 
 
 class Spill:
@@ -53,7 +53,9 @@ class Spill:
             if number > merged:
                 yield record
 
-    def keep(self, told: Sequence[Told], state: dict[str, str], waiting: Sequence[Told]) -> None:
+    def keep(
+        self, told: Sequence[Submission], state: dict[str, str], waiting: Sequence[Submission]
+    ) -> None:
         """Keep what is not in it yet.
 
         Args:
@@ -64,7 +66,7 @@ class Spill:
         new = told[self.kept :]
         last = state, list(map(id, waiting))
         if new or last != self._last:
-            parts = [[told_as_json(one) for one in each] for each in (new, waiting)]
+            parts = [[submission_as_json(one) for one in each] for each in (new, waiting)]
             try:
                 self.append([self.number + 1, parts[0], state, parts[1]])
             except OSError:

@@ -21,7 +21,7 @@ from urllib.parse import quote
 
 from armor_service.protocol import StoreError
 from armor_service.reference import Reference
-from armor_service.store.journal_conversion import put_journal_aside, read_journal
+from armor_service.store.journal_conversion import archive_journal, read_journal
 from armor_service.store.reasoning_note import ReasoningNote
 from armor_service.store.world_file import DAMAGED, ENDING, REPLACED, WorldFile
 
@@ -88,7 +88,7 @@ class Store:
         for ref in found:
             self._file(ref.name).follow(ref)
             self._files[ref.name].create()
-        if aside := put_journal_aside(self.directory):
+        if aside := archive_journal(self.directory):
             self.notes.append(
                 f'{self.directory}: {len(found)} references of its journal are Worlds of owlready2 '
                 f'now; the journal is put aside in {aside}'

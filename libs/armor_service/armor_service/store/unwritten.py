@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from armor_service.changes import AddAxiom, Change, RemoveAxiom, apply_all
-from armor_service.quarantine import Told
+from armor_service.quarantine import Submission
 from armor_service.reference import Origin, Reference
-from armor_service.store.records import TO_JSON, decode, encode, told_as_json, told_of
+from armor_service.store.records import TO_JSON, decode, encode, submission_as_json, submission_of
 from armor_service.store.world_connection import count_step
 from armor_service.store.world_ontology import WorldOntology
 from owl_reasoner.knowledge_base import KnowledgeBase
@@ -36,8 +36,8 @@ class Unwritten:
         self.net: dict[Axiom, int] = {}
         self.derived: dict[Axiom, int] = {}
         self.derived_known = True
-        self.told: list[Told] = []
-        self.groups: list[tuple[list[Told], dict[Axiom, int]]] = []
+        self.told: list[Submission] = []
+        self.groups: list[tuple[list[Submission], dict[Axiom, int]]] = []
         self._delta: dict[Axiom, int] = {}
         self._quiet = False
 
@@ -45,7 +45,7 @@ class Unwritten:
         """Take note of what changes in a reference from now on."""
         ref.kb.subscribe(self._note)
         ref.on_applied = self.applied
-        ref.on_taken_back = self._taken_back
+        ref.on_rolled_back = self._rolled_back
 
     def _note(self, changes: Changes) -> None:
         for step, batch in ((-1, changes.removed), (1, changes.added)):
@@ -57,13 +57,13 @@ class Unwritten:
                     count_step(self.net, axiom, step)
                     count_step(self._delta, axiom, step)
 
-    def applied(self, told: list[Told]) -> None:
+    def applied(self, told: list[Submission]) -> None:
         """Take note of directives whose changes were made since the last call."""
         self.told += told
         self.groups.append((told, self.take_delta()))
 
-    def _taken_back(self, lines: list[str], undo: list[Change]) -> None:
-        self.told.append(Told('', 0.0, tuple(undo)))
+    def _rolled_back(self, lines: list[str], undo: list[Change]) -> None:
+        self.told.append(Submission('', 0.0, tuple(undo)))
         self._delta = {}
 
     def take_delta(self) -> dict[Axiom, int]:
@@ -149,7 +149,7 @@ class Remembered:
 
     def __init__(self) -> None:
         self._state: dict[str, str] = {}
-        self._waiting: list[Told] = []
+        self._waiting: list[Submission] = []
         self._has_untested = False
         self._next: dict[str, str] = {}
         self._origin: tuple[Origin | None, str] = (None, '')
@@ -211,7 +211,7 @@ class Remembered:
                 origin.update(dict.fromkeys(map(decode, gone)))
         for waits, told, _, _ in groups:
             (ref.buffering.waiting if waits else ref.quarantine.untested).extend(
-                told_of(*one) for one in told
+                submission_of(*one) for one in told
             )
         if self._has_untested:
             ref.quarantine.origin = tuple(origin)
@@ -228,13 +228,13 @@ class Remembered:
             db.execute('DELETE FROM armor_told WHERE waits')
             start = 0
         rows: list[tuple[object, ...]] = [
-            (1, TO_JSON.encode([told_as_json(one)]), '[]', '[]') for one in waiting[start:]
+            (1, TO_JSON.encode([submission_as_json(one)]), '[]', '[]') for one in waiting[start:]
         ]
         if not untested and self._has_untested:
             db.execute('DELETE FROM armor_told WHERE NOT waits')
         for told, delta in lacking.groups if untested else ():
             parts = [[encode(a) for a, step in delta.items() if step == sign] for sign in (1, -1)]
-            texts = map(TO_JSON.encode, ([told_as_json(one) for one in told], *parts))
+            texts = map(TO_JSON.encode, ([submission_as_json(one) for one in told], *parts))
             rows.append((0, *texts))
         db.executemany('INSERT INTO armor_told VALUES (NULL, ?, ?, ?, ?)', rows)
         self._next = self.state(ref, record)
@@ -248,6 +248,6 @@ class Remembered:
         self._has_untested = bool(ref.quarantine.untested)
 
 
-def _same(first: list[Told], second: list[Told]) -> bool:
+def _same(first: list[Submission], second: list[Submission]) -> bool:
     """Tell whether two lists hold the same directives, by the last ones."""
     return len(first) == len(second) and (not first or first[-1] is second[-1])

@@ -356,7 +356,7 @@ class WorldConnection:
         """Return another connection to the file, which cannot write."""
         return sqlite3.connect(f'file:{quote(str(self.path))}?mode=ro', uri=True)
 
-    def put_aside(self, word: str) -> Path:
+    def quarantine(self, word: str) -> Path:
         """Close the file and give it another name, with what SQLite keeps beside it.
 
         Args:

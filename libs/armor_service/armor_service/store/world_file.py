@@ -21,11 +21,11 @@ from pathlib import Path
 
 from armor_service.changes import apply_all
 from armor_service.protocol import StoreError
-from armor_service.quarantine import Quarantine, Told, TooHardError
+from armor_service.quarantine import Quarantine, Submission, TooHardError
 from armor_service.reference import Buffering, Effort, Origin, Reference, knowledge_base
 from armor_service.store.foreign_writes import ForeignWrites
 from armor_service.store.lock_holder import lock_holder
-from armor_service.store.records import told_of
+from armor_service.store.records import submission_of
 from armor_service.store.spill import Spill
 from armor_service.store.unwritten import Remembered, Unwritten
 from armor_service.store.world_connection import ANONYMOUS, BUSY, INFERRED, WorldConnection
@@ -167,7 +167,7 @@ class WorldFile:
         """Do again what was answered while the file could not be written."""
         ref, quarantine = self.ref, self.ref.quarantine
         for told, state, waiting in self._spill.read(merged, notes):
-            applied = [told_of(*one) for one in told]
+            applied = [submission_of(*one) for one in told]
             if applied:
                 quarantine.origin = quarantine.origin or tuple(ref.kb.axioms())
                 for one in applied:
@@ -175,7 +175,7 @@ class WorldFile:
                 quarantine.untested += applied
                 self._lacking.applied(applied)
             ref.buffering = Buffering(*json.loads(state['buffering']))
-            ref.buffering.waiting = [told_of(*one) for one in waiting]
+            ref.buffering.waiting = [submission_of(*one) for one in waiting]
             ref.mounted = state['mounted']
             quarantine.lines = json.loads(state['quarantine'])
         # What is in the spill already is not written there again.
@@ -183,7 +183,7 @@ class WorldFile:
 
     def _salvaged(self, error: Exception, notes: list[str]) -> Reference | None:
         """Put a damaged file aside, and go on with what can be read of it."""
-        aside = self.connection.put_aside(DAMAGED)
+        aside = self.connection.quarantine(DAMAGED)
         quads, lost = self.connection.salvage(aside)
         told = f'{self.path}: {error}; put aside in {aside.name}; '
         if not quads:
@@ -218,7 +218,7 @@ class WorldFile:
         if self.path.exists():
             # No reference's: somebody put it there, or it was left alone.
             with suppress(OSError):
-                aside = self.connection.put_aside(REPLACED)
+                aside = self.connection.quarantine(REPLACED)
                 self._tell(f'what was there is put aside in {aside.name}')
         with suppress(OSError):
             self._spill.clear()
@@ -235,7 +235,7 @@ class WorldFile:
         with self._lock:
             if self._failure.text:
                 # Whoever attends to the file tries again; nobody waits for that.
-                self._keep_aside()
+                self._quarantine()
             elif self._has_news():
                 self._commit_or_spill()
 
@@ -256,7 +256,7 @@ class WorldFile:
                     self.ref.reason_at_once()
         except (sqlite3.Error, OSError) as error:
             self._failed(error)
-            self._keep_aside()
+            self._quarantine()
             return False
         if self._failure.text:
             self.connection.wait_for_others(BUSY)
@@ -266,11 +266,11 @@ class WorldFile:
             self._spill.clear()
         return True
 
-    def _committed(self) -> Told | None:
+    def _committed(self) -> Submission | None:
         """Write what changed; return what others changed, which is taken in before."""
         db = self._opened()
         ref, lacking, remembered = self.ref, self._lacking, self._remembered
-        told: Told | None = None
+        told: Submission | None = None
         with self.connection.transaction(ref.kb.iri) as (ontology, inferred):
             if lacking.whole:
                 self.connection.empty((ontology.context, inferred.context))
@@ -291,13 +291,13 @@ class WorldFile:
             # Damaged while it is in use: all that is known is written into another one.
             where = ''
             with suppress(OSError):
-                where = f'put aside in {self.connection.put_aside(DAMAGED).name} and '
+                where = f'put aside in {self.connection.quarantine(DAMAGED).name} and '
             self._lacking.whole = True
             self._tell(f'{error}; {where}written anew')
         self._failure.met(error)
         self.connection.wait_for_others(0.0)
 
-    def _keep_aside(self) -> None:
+    def _quarantine(self) -> None:
         """Append what was answered to the spill; it waits in memory where that cannot be, too."""
         told, whole = self._lacking.told, self._lacking.whole
         if not whole:
