@@ -31,7 +31,7 @@ OTHERS: dict[str, list[str] | None] = {
 """Words for scripts that have no `--smoke`; None: it is no command of its own."""
 LONG = ('navigation.py', 'campaign.py', 'surveil.py', 'page.py', 'startup.py', 'armor_calls.py')
 """Begun first, so that both rows end together."""
-PATIENCE = 300.0
+PATIENCE = 1200.0
 """Seconds after which a script counts as hanging; a busy machine takes many times as long."""
 
 

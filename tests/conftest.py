@@ -197,9 +197,9 @@ class Graph:
         self._nodes.remove(node)
         done = threading.Event()
         self._spinner.executor.create_task(lambda: (node.destroy_node(), done.set()))
-        assert done.wait(60.0), 'executor does not spin'
+        assert done.wait(240.0), 'executor does not spin'
 
-    def until(self, predicate: Callable[[], Any], timeout: float = 60.0) -> Any:
+    def until(self, predicate: Callable[[], Any], timeout: float = 240.0) -> Any:
         """Wait until the predicate holds; it is looked at whenever `touch` is called and often.
 
         Returns:

@@ -99,7 +99,6 @@ def prepare(checkout: Path, *words: str, **more: str) -> subprocess.CompletedPro
         env=environ(**more),
         capture_output=True,
         text=True,
-        timeout=200,
         check=False,
     )
 

@@ -8,6 +8,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import uuid
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,13 @@ from launcher.service import is_service, notify, unit_path, unit_text
 from tests.launcher.conftest import ROOT, USER_ENVIRON
 
 MISSION = str(Path(__file__).with_name('mission_process.py'))
+
+
+def listening(listener: socket.socket) -> str:
+    """Give a socket a name, and return it as systemd says it: a path may be too long for one."""
+    name = f'surveillance-test-{uuid.uuid4()}'
+    listener.bind(f'\0{name}')
+    return f'@{name}'
 
 
 def test_the_unit_runs_the_command_line_that_was_asked_for():
@@ -59,11 +67,10 @@ def test_the_command_writes_it_into_the_users_folder(tmp_path, monkeypatch, caps
 def test_a_service_that_is_stopped_with_its_machine_goes_on_later(start, tmp_path, ros_domain):
     runs = tmp_path / 'runs'
     words = (MISSION, str(runs), '--only', 'armor_server', '--domain', str(ros_domain))
-    for socket_name in ('first', 'second'):
-        address = str(tmp_path / socket_name)
+    for _ in range(2):
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-            listener.bind(address)
-            listener.settimeout(60.0)
+            address = listening(listener)
+            listener.settimeout(240.0)
             service = start(*words, environ={**USER_ENVIRON, 'NOTIFY_SOCKET': address})
             assert [listener.recv(100) for _ in range(3)] == [b'READY=1', *2 * [b'WATCHDOG=1']]
             assert service.end(signal.SIGTERM)[0] == 0
@@ -72,9 +79,8 @@ def test_a_service_that_is_stopped_with_its_machine_goes_on_later(start, tmp_pat
 
 
 def test_systemd_is_told_where_it_listens(tmp_path, monkeypatch):
-    address = str(tmp_path / 'socket')
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
-        listener.bind(address)
+        address = listening(listener)
         monkeypatch.setenv('NOTIFY_SOCKET', address)
         for started in (None, str(os.getpid())):
             monkeypatch.delenv('SYSTEMD_EXEC_PID', raising=False)

@@ -60,7 +60,6 @@ def carried_out(line: str, folder: Path, capfd: pytest.CaptureFixture[str]) -> s
         env=USER_ENVIRON,
         capture_output=True,
         text=True,
-        timeout=200,
         check=False,
     )
     assert done.returncode == 0, (line, done.stdout[-2000:], done.stderr)

@@ -1148,15 +1148,20 @@ def test_a_chair_that_moves_each_day_is_learned_and_a_person_undoes_it() -> None
     watch = baseline_round()
     seed = int(np.random.default_rng().integers(10**6))
     rng = np.random.default_rng(seed)
+    # At some spots of the room a chair is seen in part only, as a smaller thing: not at these.
+    spots = [(1.8, 3.4), (2.4, 4.0), (3.0, 3.4), (3.6, 4.0), (4.2, 3.4)]
+    days: list[int] = []
+    while len(days) < 12:  # each in turn: one that goes to and fro between two has few spots
+        turn = rng.permutation(len(spots)).tolist()
+        days += turn if turn[0] not in days[-1:] else []
     told = []
-    for _ in range(12):
-        x, y = rng.uniform((1.5, 3.2), (4.5, 4.3))
+    for at in days:
         before = len(watch.alerts)
-        watch.visit('R1', HERE, boxes=[(float(x), float(y), 0.2)])
+        watch.visit('R1', HERE, boxes=[(*spots[at], 0.2)])
         told.append(len(watch.alerts) - before)
         watch.time += 86_400.0
-    assert sum(map(bool, told)) <= 7, f'seed {seed}: {told}'
-    assert sum(map(bool, told[7:])) <= 1, f'seed {seed}: {told}'
+    assert any(told), f'seed {seed}'
+    assert not any(told[7:]), f'seed {seed}: {told}'
     (event,) = (each for each in watch.book.events if each.seen == 'movable')
     watch.watcher.answer(event.number, EventState.FALSE)
     assert [each.is_undone for each in watch.watcher.movables.listed()] == [True]
