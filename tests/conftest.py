@@ -53,6 +53,9 @@ os.environ['XDG_STATE_HOME'] = str(_STATE)
 _MEMORY = _STATE / 'memory'
 _MEMORY.mkdir()
 os.environ['XDG_RUNTIME_DIR'] = str(_MEMORY)
+# Nor are its proxies: servers of a test are on this machine.
+for _name in [name for name in os.environ if name.lower().endswith('_proxy')]:
+    del os.environ[_name]
 USER_ENVIRON = dict(os.environ)
 """What a user's shell gives to a command; tests of commands start them with it."""
 # A test machine's neighbours are no part of a test.

@@ -52,7 +52,8 @@ def test_systemd_takes_the_unit(tmp_path):
         text=True,
         env={**os.environ, 'XDG_RUNTIME_DIR': str(tmp_path)},
     )
-    assert (done.returncode, done.stderr) == (0, '')
+    # What it says of other units is not our matter.
+    assert (done.returncode, path.name in done.stderr) == (0, False), done.stderr
 
 
 def test_the_command_writes_it_into_the_users_folder(tmp_path, monkeypatch, capsys):

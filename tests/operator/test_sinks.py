@@ -6,6 +6,7 @@ import base64
 import json
 import logging
 import os
+import shlex
 import shutil
 import subprocess
 import threading
@@ -216,9 +217,9 @@ def test_without_the_package_mqtt_is_one_line(monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_command_gets_the_line_and_the_json(tmp_path: Path) -> None:
     script = tmp_path / 'tell'
-    script.write_text(f'#!/bin/sh\necho "$1" > {tmp_path}/line\ncat > {tmp_path}/json\n')
+    script.write_text(f"#!/bin/sh\necho \"$1\" > '{tmp_path}/line'\ncat > '{tmp_path}/json'\n")
     script.chmod(0o755)
-    sink_of(sink_from('c', {'command': str(script)}))(news())
+    sink_of(sink_from('c', {'command': shlex.quote(str(script))}))(news())
     assert (tmp_path / 'line').read_text() == '3: door D1 is ajar in C1\n'
     assert json.loads((tmp_path / 'json').read_text())['key'] == 'k1'
 

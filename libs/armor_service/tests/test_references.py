@@ -420,7 +420,9 @@ def test_what_the_reasoner_does_not_support_is_reported_at_load(
     assert listed[0] in answer.error_description
 
 
-def test_the_web_when_it_is_allowed(tmp_path: Path) -> None:
+def test_the_web_when_it_is_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('no_proxy', '*')
+
     class Quiet(SimpleHTTPRequestHandler):
         def log_message(self, *_: object) -> None:
             pass
