@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from indoor_watch import Event, EventBook, EventState, Kind, Observation
+from indoor_watch.events import OFF_DELAY
 from surveillance_perception.finding_teller import PERSON, FindingTeller, findings_of
 from surveillance_runtime.event_log import read
 from surveillance_runtime.incidents import IncidentBook, Incidents, IncidentUpdate, Severity
@@ -28,7 +29,12 @@ class Told:
         self.book = EventBook(told=self.teller.changed)
 
     def see_door(self, state: str, stamp: float, visit: int = 1) -> Event | None:
-        """See the door D1; ajar matters."""
+        """See the door D1; ajar matters, and two looks say that it is so no more."""
+        if state != 'ajar':
+            self.see_door_once(state, stamp - OFF_DELAY, visit)
+        return self.see_door_once(state, stamp, visit)
+
+    def see_door_once(self, state: str, stamp: float, visit: int) -> Event | None:
         seen = Observation(Kind.DOOR, state, 'C1', 'D1', stamp=stamp, evidence=f'3_{visit}_a.jpg')
         severity = 3 if state == 'ajar' else 0
         found = self.book.take(seen, severity=severity, rule='D1 is shut', visit=visit)
@@ -50,7 +56,7 @@ def test_an_alert_is_an_incident_with_what_was_seen(tmp_path: Path) -> None:
     assert (begun.place, begun.evidence) == ('C1', ('3_1_a.jpg',))
     assert begun.finding is not None
     assert (begun.finding.number, begun.finding.kind, begun.finding.subject) == (1, 'door', 'D1')
-    told.see_door('closed', 30.0, visit=3)
+    told.see_door('closed', 31.0, visit=3)
     assert told.phases == ['begin', 'end']
 
 
@@ -122,8 +128,8 @@ def test_the_log_has_each_change_and_further_looks(tmp_path: Path) -> None:
 def test_after_a_restart_the_book_is_whole_and_what_goes_on_is_told(tmp_path: Path) -> None:
     told = Told(tmp_path)
     told.see_door('ajar', 10.0)
-    told.see_door('closed', 20.0, visit=2)
-    told.see_door('ajar', 30.0, visit=3)
+    told.see_door('closed', 30.0, visit=2)
+    told.see_door('ajar', 40.0, visit=3)
     kept = told.teller.kept(told.book.state())
     assert [each['number'] for each in kept['events']] == [2], 'what is over is in the log'
     again = Told(tmp_path)

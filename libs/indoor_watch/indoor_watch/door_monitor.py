@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from indoor_watch.doors import Segment, read_door
+from indoor_watch.events import ELSEWHERE
 from indoor_watch.floor import is_leaf
 from indoor_watch.observations import Kind, Observation
 from indoor_watch.visit import SEEN_AGAIN, LidarSweep, Pictured, Rooms, Visit
@@ -30,6 +31,7 @@ class _Door:
     segment: Segment
     told: str = ''
     told_at: float = -math.inf
+    told_from: tuple[float, float] | None = None
     place: str = ''
 
     @property
@@ -63,21 +65,30 @@ class DoorMonitor:
             if reading is not None:
                 readings = visit.readings.setdefault(name, deque(maxlen=READINGS))
                 readings.append((str(reading.state), reading.confidence))
-                seen = self._judged(name, door, visit, sweep.stamp)
+                seen = self._judged(name, door, visit, sweep)
                 found += [] if seen is None else [Pictured(seen)]
         return found
 
-    def _judged(self, name: str, door: _Door, visit: Visit, stamp: float) -> Observation | None:
+    def _judged(
+        self, name: str, door: _Door, visit: Visit, sweep: LidarSweep
+    ) -> Observation | None:
+        stamp, sensor = sweep.stamp, sweep.sensor
         readings = visit.readings[name]
         states = [state for state, _ in readings]
         state = max(set(states), key=states.count)
         if states.count(state) < AGREEING:
             return None
         visit.doors[name] = state
-        if state == door.told and abs(stamp - door.told_at) < SEEN_AGAIN:
+        is_new = state != door.told or abs(stamp - door.told_at) >= SEEN_AGAIN
+        # A second look from elsewhere is told once, of readings of its own.
+        is_second = door.told_from is not None and math.dist(door.told_from, sensor) >= ELSEWHERE
+        if not is_new and not is_second:
             return None
         sure = float(np.mean([sure for each, sure in readings if each == state]))
-        door.told, door.told_at = state, stamp
+        readings.clear()
+        if is_new:
+            door.told_at = stamp
+        door.told, door.told_from = state, sensor if is_new else None
         place = visit.place
         if visit.rooms is not None:
             door.place = door.place or _smaller_side(door.segment, visit.rooms)

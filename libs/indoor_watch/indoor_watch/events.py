@@ -1,8 +1,8 @@
 """Events: sightings of the same thing over visits and robots, from the first one to its end.
 
 An event is open until a person acknowledges it, calls it normal or false, or it is over: what was
-seen is seen no more, in a visit that would have shown it. The book is bounded: of what is over the
-least severe and oldest goes first; what is open stays.
+seen is seen no more, in a visit that would have shown it, or two looks show it as it is to be. The
+book is bounded: of what is over the least severe and oldest goes first; what is open stays.
 """
 
 from __future__ import annotations
@@ -24,6 +24,10 @@ SURE = 0.95
 """A sighting as sure as this needs no second one."""
 ELSEWHERE = 0.5
 """A second look is one from so far from where the first one was, metres."""
+OFF_DELAY = 10.0
+"""Or one so long after the first one, where that says that an event is over, seconds. An off-delay
+keeps an alarm from coming and going (ANSI/ISA-18.2, 2016); who stands in a doorway has left it by
+then."""
 
 
 class _Look(NamedTuple):
@@ -180,6 +184,8 @@ class EventBook:
         self._surest: dict[int, tuple[float, str]] = {}
         self._looked: dict[int, _Look] = {}
         self._quiet: set[int] = set()
+        # The first look of those that say that an event is over, and its visit.
+        self._ending: dict[int, tuple[Observation, int]] = {}
 
     @property
     def events(self) -> list[Event]:
@@ -204,7 +210,7 @@ class EventBook:
         """
         if severity > 0:
             self._turn(seen)
-        self._end_others(seen)
+        self._end_others(seen, visit if severity <= 0 else None)
         if any(_same(each, seen) for each in self._normal.get(_key(seen), ())):
             return None
         event = self._event_of(seen)
@@ -241,9 +247,10 @@ class EventBook:
             self._surest[event.number] = seen.confidence, seen.evidence
             self._keep(event)
             return event
+        self._ending.pop(event.number, None)
         new_visit = self._visits.get(event.number) != visit
         self._visits[event.number] = visit
-        is_elsewhere = _from_elsewhere(event, seen)
+        is_elsewhere = _apart(event.seen_from, seen.seen_from)
         how = 'from elsewhere' if is_elsewhere else 'in another visit'
         sensors = tuple(dict.fromkeys((*event.sensors, *([seen.sensor] if seen.sensor else ()))))
         alone = _by_camera_alone(seen.kind, sensors)
@@ -382,7 +389,7 @@ class EventBook:
         for each in normal:
             self._normal.setdefault(_key(each), []).append(each)
         self._visits, self._surest, self._quiet = {}, {}, quiet
-        self._looked = {}
+        self._looked, self._ending = {}, {}
         self._current, self._over = {}, []
         for event in events:
             self._index(event)
@@ -410,6 +417,7 @@ class EventBook:
             self._visits.pop(number, None)
             self._surest.pop(number, None)
             self._looked.pop(number, None)
+            self._ending.pop(number, None)
             self._current.get(_key(least), set()).discard(number)
 
     def _index(self, event: Event) -> None:
@@ -447,15 +455,41 @@ class EventBook:
             if is_open and _ends(each, seen) and seen.stamp > each.last:
                 self._keep(replace(each, seen=seen.state), seen)
 
-    def _end_others(self, seen: Observation) -> None:
-        """End events of the same thing in another state: a door that is open is closed no more."""
+    def _end_others(self, seen: Observation, visit: int | None) -> None:
+        """End events of the same thing in another state: a door that is open is closed no more.
+
+        Of a door two looks must say so: one that is wrong would have it told again. What pictures
+        show is told once several of them agree.
+
+        Args:
+            seen: What was seen.
+            visit: In which visit; None: it breaks a rule itself, and ends them at once.
+        """
         for each in self._near(seen):
             if not _ends(each, seen) or seen.stamp <= each.last:
+                continue
+            if (
+                each.kind == Kind.DOOR
+                and visit is not None
+                and not self._is_second(each.number, seen, visit)
+            ):
                 continue
             if each.state in _GOING_ON:
                 self._keep(replace(each, state=EventState.OVER, last=seen.stamp), seen)
             self._quiet.discard(each.number)
             self._index(self._events[each.number])
+
+    def _is_second(self, number: int, seen: Observation, visit: int) -> bool:
+        """Tell whether an event's end was seen before, by a look that errs by itself."""
+        first, in_visit = self._ending.setdefault(number, (seen, visit))
+        is_apart = (
+            visit != in_visit
+            or seen.stamp - first.stamp >= OFF_DELAY
+            or _apart(first.seen_from, seen.seen_from)
+        )
+        if is_apart:
+            del self._ending[number]
+        return is_apart
 
 
 _GOING_ON = (EventState.OPEN, EventState.ACKNOWLEDGED)
@@ -504,10 +538,9 @@ def _ends(event: Event, seen: Observation) -> bool:
     return not _agrees(event, seen)
 
 
-def _from_elsewhere(event: Event, seen: Observation) -> bool:
-    if event.seen_from is None or seen.seen_from is None:
-        return False
-    return math.dist(event.seen_from, seen.seen_from) >= ELSEWHERE
+def _apart(one: tuple[float, float] | None, other: tuple[float, float] | None) -> bool:
+    """Tell whether two looks were from two spots."""
+    return one is not None and other is not None and math.dist(one, other) >= ELSEWHERE
 
 
 def _by_camera_alone(kind: Kind, sensors: tuple[str, ...]) -> bool:

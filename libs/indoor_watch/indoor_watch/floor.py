@@ -3,8 +3,8 @@
 Each visit leaves three sets of cells: where beams ended, where they passed, and where both happened
 at different times, which is what moves. What stood in no visit before and is no wall of the map has
 appeared; what stood there and is passed through by beams now has gone. A thing that has gone here
-and appeared there in the same visit, of like size, has moved. What was not in view this time is
-neither: it was not seen.
+and appeared near there in the same visit, of like size, has moved. What was not in view this time
+is neither: it was not seen.
 
 The grid is an occupancy grid of counts (Thrun, Burgard and Fox, Probabilistic Robotics, chapter 9),
 kept for each visit alone, so that an old look never outvotes a new one.
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -21,6 +22,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.optimize import linear_sum_assignment
 
 from floor_plans import Grid
 from floor_plans.occupancy_grid import distance_to
@@ -46,6 +48,9 @@ LEAST_EXTENT = 0.08
 """A smaller cluster is no thing, metres."""
 SAME_SIZE = 1.6
 """Extents of a thing that moved may differ by this factor: it is seen from another side."""
+ROAMS = 3.0
+"""A thing that was moved is so far from where it stood at most, metres: across a room of an
+office. Farther away one has gone, and another has come."""
 LEAF_SLACK = 0.13
 """How far from the line of a door's leaf its cells may lie, metres: a cell, noise, its depth."""
 FAR_FROM_WALL, NEAR_END, PASSED_BEFORE = 0.25, 0.1, 3
@@ -275,21 +280,19 @@ def changes(before: FloorView, now: FloorView) -> list[ObjectChange]:
     new = _things(grid, now.occupied & ~stood, known_free)
     # Passed through itself: beside a thing that is seen from another side now the floor is free.
     gone = _things(grid, before.occupied & ~stands, now.free)
-    found = []
-    for thing in gone:
-        to = min(
-            (each for each in new if _alike(thing, each)),
-            key=lambda each: math.dist(each.position, thing.position),
-            default=None,
+    pairs = _pairs(gone, new)
+    found = [
+        replace(
+            _changed(Change.MOVED, to),
+            confidence=min(thing.confidence, to.confidence),
+            before=thing.position,
         )
-        if to is None:
-            found.append(_changed(Change.REMOVED, thing))
-        else:
-            new.remove(to)
-            sure = min(thing.confidence, to.confidence)
-            found.append(
-                replace(_changed(Change.MOVED, to), confidence=sure, before=thing.position)
-            )
+        for thing, to in pairs
+    ]
+    found += [
+        _changed(Change.REMOVED, each) for each in gone if all(each is not a for a, _ in pairs)
+    ]
+    new = [each for each in new if all(each is not b for _, b in pairs)]
     found += [_changed(Change.APPEARED, each) for each in new]
     return sorted(found, key=lambda each: -each.extent)
 
@@ -336,6 +339,23 @@ class _Thing:
 
 def _changed(change: Change, thing: _Thing) -> ObjectChange:
     return ObjectChange(change, thing.position, thing.extent, thing.confidence, points=thing.points)
+
+
+def _pairs(gone: Sequence[_Thing], new: Sequence[_Thing]) -> list[tuple[_Thing, _Thing]]:
+    """Return what went and came elsewhere: as many as may be, over the least distance in all."""
+    costs = np.array([[_way(one, to) for to in new] for one in gone]).reshape(len(gone), len(new))
+    # One pair more is worth any distance.
+    most = ROAMS * (1 + min(costs.shape))
+    rows, columns = (each.tolist() for each in linear_sum_assignment(np.minimum(costs, most)))
+    return [
+        (gone[at], new[to]) for at, to in zip(rows, columns, strict=True) if costs[at, to] < most
+    ]
+
+
+def _way(one: _Thing, other: _Thing) -> float:
+    """Return how far one thing would have moved to be another, metres; inf: it cannot be."""
+    away = math.dist(one.position, other.position)
+    return away if away <= ROAMS and _alike(one, other) else math.inf
 
 
 def _alike(one: _Thing, other: _Thing) -> bool:

@@ -13,13 +13,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from indoor_watch.floor import SAME_SIZE, Change, ObjectChange
+from indoor_watch.floor import ROAMS, SAME_SIZE, Change, ObjectChange
 
 ANOTHER_SPOT = 0.4
 """A thing has moved when it is so far from where it stood, metres: as two assessments mean one
 thing up to there (`floor_monitor.SAME_THING`)."""
-ROAMS = 3.0
-"""So far from where it has stood before, metres: across a room of an office."""
 FEWEST_SPOTS = 4
 """It has stood at so many spots, one after the other, before it is movable: told three times."""
 FEWEST_SECONDS = 2 * 86_400.0

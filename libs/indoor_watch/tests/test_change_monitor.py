@@ -213,7 +213,24 @@ def test_a_door_must_be_open_in_two_looks_by_its_rule():
     watch.visit('R1', HERE, shut=False)
     assert watch.alerts
     watch.visit('R1', HERE)
+    assert [each.state for each in watch.book.events] == [EventState.OPEN], 'one look may be wrong'
+    watch.visit('R1', HERE)
     assert [each.state for each in watch.book.events] == [EventState.OVER]
+
+
+def test_a_door_is_told_again_from_elsewhere_once():
+    watch = Round()
+    watch.watcher.arrive('R1', watch.time)
+    for number in range(20):
+        watch.time += 0.4
+        at = HERE[0] + 0.1 * number, HERE[1]
+        watch.watcher.sweep(at, *beams(at, (), True, seed=number), watch.time)
+    doors = [each for each in watch.told if each.kind == Kind.DOOR]
+    first, second = (each.seen_from for each in doors)
+    assert first is not None
+    assert second is not None
+    assert math.dist(first, second) >= 0.5
+    assert {each.state for each in doors} == {'closed'}
 
 
 class Sized(Halves):
@@ -773,7 +790,8 @@ def test_a_door_that_is_seen_shut_is_open_no_more_also_when_the_clock_was_set_ba
         after = Round()
         after.watcher.restore(json.loads(json.dumps(watch.watcher.state())))
     after.time = watch.time - 3600.0
-    after.visit('R1', HERE)
+    for _ in range(2):
+        after.visit('R1', HERE)
     (event,) = (each for each in after.book.events if each.kind == Kind.DOOR)
     assert event.state == EventState.OVER
     assert event.began <= event.last <= after.time

@@ -47,9 +47,44 @@ def test_what_no_rule_cares_for_begins_nothing_and_ends_what_it_contradicts():
     take(book, seen(state='open', **door))
     assert take(book, seen(state='ajar', stamp=50.0, **door), severity=0) is None
     assert book.events[0].state == EventState.OPEN, 'what was seen before does not end it'
+    take(book, seen(state='closed', stamp=190.0, **door), severity=0)
+    assert book.events[0].state == EventState.OPEN, 'one look may be wrong'
     take(book, seen(state='closed', stamp=200.0, **door), severity=0)
     assert [each.state for each in book.events] == [EventState.OVER]
     assert book.events[0].last == 200.0
+
+
+@pytest.mark.parametrize(
+    ('more', 'look', 'is_over'),
+    [
+        ({'stamp': 209.9}, 1, False),
+        ({'stamp': 210.0}, 1, True),
+        ({'stamp': 201.0}, 2, True),
+        ({'stamp': 201.0, 'seen_from': (0.6, 0.0)}, 1, True),
+        ({'stamp': 201.0, 'seen_from': (0.4, 0.0)}, 1, False),
+    ],
+)
+def test_an_event_of_a_door_is_over_once_two_looks_that_err_apart_say_so(more, look, is_over):
+    told: list[Event] = []
+    book = EventBook(told=lambda event, _: told.append(event))
+    door = {'kind': Kind.DOOR, 'subject': 'D3', 'position': None, 'seen_from': (0.0, 0.0)}
+    take(book, seen(state='ajar', **door))
+    # A look that is wrong, and the door as before: nobody is told a second time.
+    for stamp, state, severity in ((150.0, 'open', 0), (155.0, 'ajar', 2), (200.0, 'open', 0)):
+        take(book, seen(state=state, stamp=stamp, **door), severity=severity)
+    assert [(each.number, each.state) for each in told] == [(1, EventState.OPEN)]
+    take(book, seen(state='open', **{**door, **more}), severity=0, look=look)
+    assert (book.find(1).state == EventState.OVER) == is_over
+
+
+def test_what_a_person_called_false_stays_quiet_when_one_look_shows_it_otherwise():
+    book = EventBook()
+    door = {'kind': Kind.DOOR, 'subject': 'D3', 'position': None}
+    take(book, seen(state='ajar', **door))
+    book.answer(1, EventState.FALSE)
+    take(book, seen(state='open', stamp=150.0, **door), severity=0)
+    take(book, seen(state='ajar', stamp=155.0, **door))
+    assert len(book.events) == 1
 
 
 def test_a_door_that_breaks_its_rule_in_another_way_is_one_event_until_it_is_acknowledged():
@@ -63,6 +98,7 @@ def test_a_door_that_breaks_its_rule_in_another_way_is_one_event_until_it_is_ack
     take(book, seen(state='ajar', stamp=400.0, **door))
     assert [book.find(each).state for each in (1, 2)] == [EventState.OVER, EventState.OPEN]
     take(book, seen(state='open', stamp=500.0, **door), severity=0)
+    take(book, seen(state='open', stamp=510.0, **door), severity=0)
     assert {each.state for each in book.events} == {EventState.OVER}
 
 

@@ -129,6 +129,32 @@ def test_a_chair_that_was_moved_is_one_thing_with_two_places(office):
     assert math.dist(found.before, CHAIR[:2]) < 0.3
 
 
+def seen_at(*middles: tuple[float, float]) -> FloorView:
+    """Return a view of a free hall of 12 by 12 m with square things of 0.3 m."""
+    occupied = np.zeros((240, 240), np.bool_)
+    for x, y in middles:
+        row, column = round(y / RESOLUTION), round(x / RESOLUTION)
+        occupied[row - 3 : row + 3, column - 3 : column + 3] = True
+    grid = Grid(np.zeros((240, 240), np.int8), RESOLUTION)
+    return FloorView(grid, occupied, ~occupied, np.zeros_like(occupied))
+
+
+def test_what_comes_far_from_what_went_is_another_thing():
+    far = changes(seen_at((1.0, 1.0)), seen_at((1.0, 4.2)))
+    assert sorted(each.change for each in far) == [Change.APPEARED, Change.REMOVED]
+    near = changes(seen_at((1.0, 1.0)), seen_at((1.0, 3.8)))
+    assert [each.change for each in near] == [Change.MOVED]
+
+
+def test_each_thing_that_moved_is_paired_with_its_own():
+    """The first would take what is nearest to it, and belongs to the second."""
+    found = changes(seen_at((1.0, 5.0), (3.0, 5.0)), seen_at((3.0, 5.6), (1.0, 7.3)))
+    assert [each.change for each in found] == [Change.MOVED] * 2
+    for each in found:
+        assert each.before is not None
+        assert each.position[0] == pytest.approx(each.before[0], abs=0.1)
+
+
 def test_what_was_hidden_is_neither_gone_nor_new(office):
     behind = (4.5, 2.0, 0.12)
     screen = (3.9, 3.0, 0.7)
