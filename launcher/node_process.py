@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import importlib
 import os
 import resource
 import signal
 import sys
 
 from surveillance_runtime import launch_protocol
+from surveillance_runtime.composition import run_together
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
@@ -56,17 +56,7 @@ def main(argv: list[str]) -> int:
         module, _, class_name = place.partition(':')
         parsed.append((name, module, class_name))
     sys.argv = [parsed[0][0], *arguments]
-    modules = [importlib.import_module(module) for _, module, _ in parsed]
-    say_up()
-    if len(parsed) == 1:
-        return int(modules[0].main(arguments) or 0)
-    from surveillance_runtime.process import run_nodes
-
-    for each in modules:
-        if prepare := getattr(each, 'prepare_process', None):
-            prepare()
-    classes = [getattr(module, parsed[i][2]) for i, module in enumerate(modules)]
-    return run_nodes(classes, arguments)
+    return run_together([(module, name) for _, module, name in parsed], arguments, say_up)
 
 
 if __name__ == '__main__':

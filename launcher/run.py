@@ -205,9 +205,7 @@ class Run:
         group=_PROCESSES,
         choices=node_table.COMPOSITIONS,
         metavar='|'.join(node_table.COMPOSITIONS),
-        help='how the nodes share processes: few, so that what guards the base, what knows and '
-        'what records go on without the others; one-each; or one for all that work '
-        '(default: %(default)s)',
+        help=f'{OPTIONS["processes"].help} (default: %(default)s)',
     )
     only: Sequence[str] = _nodes_option('--only', OPTIONS['only'].help)
     without: Sequence[str] = _nodes_option('--without', OPTIONS['without'].help)

@@ -12,6 +12,7 @@ from launcher.log_merge import ROS_FORMAT
 from launcher.run import PAGE, Run
 from launcher.supervisor import ManagedProcess
 from surveillance_runtime import node_table
+from surveillance_runtime.composition import in_order
 from surveillance_runtime.discovery import LAST_DOMAIN, launched_nodes
 from surveillance_runtime.launch_protocol import ONE_THREAD
 from surveillance_runtime.run_parameters import BEHAVIOUR_NODE
@@ -83,10 +84,7 @@ def command(nodes: Sequence[node_table.Node], arguments: Sequence[str], parent: 
     """Return the command of one process that holds `nodes`; it ends with `parent`, unless that
     is 0.
     """
-    # Nodes of one process are stopped from the last to the first: the one that uses the others
-    # comes last.
-    ordered = sorted(nodes, key=lambda node: node.name == BEHAVIOUR_NODE)
-    targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in ordered)
+    targets = ','.join(f'{n.name}={n.module}:{n.class_name}' for n in in_order(nodes))
     return [interpreter(), '-P', str(NODE_PROCESS), str(parent), targets, *arguments]
 
 
@@ -98,14 +96,9 @@ def programs_of(
 ) -> list[ManagedProcess]:
     """Return the processes of a part of a run, each with the nodes that share it."""
     run = part.run
-    members: dict[str, list[node_table.Node]] = {}
-    for node in part.everyone:
-        # At the console, `exit NODE` ends one of these.
-        ends_alone = run.mode == 'MANUAL' and node.has_modes
-        name = node_table.process_of(node.name, run.processes, ends_alone=ends_alone)
-        members.setdefault(name, []).append(node)
     programs = []
-    for process, nodes in members.items():
+    shared = node_table.by_process(part.everyone, run.processes, run.mode)
+    for process, nodes in shared.items():
         names = [node.name for node in nodes]
         arguments = ros_arguments([files[name] for name in names], run, renamed)
         # It prints into the launcher's log; one of its own, as ROS writes it, grows without bound.

@@ -17,6 +17,6 @@ setup(
     description='Shared code of the nodes: parameters, node base class, process life.',
     license='Apache-2.0',
     entry_points={
-        'console_scripts': [],
+        'console_scripts': ['nodes = surveillance_runtime.composition:main'],
     },
 )

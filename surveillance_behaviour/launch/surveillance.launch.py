@@ -13,8 +13,9 @@ import atexit
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
@@ -30,7 +31,7 @@ from surveillance_runtime.discovery import launched_nodes, problem_of
 from surveillance_runtime.event_log import record_in
 from surveillance_runtime.fleet_parts import Choice, TeamPart, team_parts
 from surveillance_runtime.launch_protocol import EXIT_CANNOT_START, EXIT_NOT_NOW
-from surveillance_runtime.node_table import ALARM, MARKERS, RECORDER, find, select
+from surveillance_runtime.node_table import ALARM, MARKERS, RECORDER, by_process, find, select
 from surveillance_runtime.node_table import Node as NodeOfTable
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.profile import (
@@ -73,7 +74,7 @@ ARGUMENTS = [
 
 
 def start_nodes(context: LaunchContext) -> list[Node]:
-    """Return the nodes that the arguments ask for, each with one file of parameters.
+    """Return the processes of the nodes that the arguments ask for, one file of parameters each.
 
     Raises:
         ParameterError, FileError: One line about the first thing that is wrong with the
@@ -113,7 +114,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
 
 
 def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Path) -> list[Node]:
-    """Return the nodes of one part: of the only robot, of a robot of a fleet, or shared."""
+    """Return the processes of one part: of the only robot, of a robot of a fleet, or shared."""
     mode, behaviour = given['mode'], given['behaviour']
     robot = read_profile(find_profile(config, part.profile or given['robot']))
     names = [node.name for node in part.nodes]
@@ -151,11 +152,9 @@ def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Pa
     environ = launched_nodes(os.environ, given['network'])
     return [
         Node(
-            package=node.package,
-            executable=node.name,
-            name=node.name,
+            **_program(process, nodes),
             namespace=part.namespace,
-            parameters=[str(files[node.name])],
+            parameters=[str(files[node.name]) for node in nodes],
             remappings=renamed,
             ros_arguments=['--log-level', given['log_level']],
             additional_env=environ,
@@ -165,8 +164,19 @@ def _nodes_of(part: TeamPart, given: Mapping[str, str], config: Path, folder: Pa
             respawn_delay=1.0,
             on_exit=stop_if_unusable,
         )
-        for node in part.everyone
+        for process, nodes in by_process(part.everyone, given['processes'], mode).items()
     ]
+
+
+def _program(process: str, nodes: Sequence[NodeOfTable]) -> dict[str, Any]:
+    """Return what runs the nodes of a process; of several, each keeps its own name."""
+    if len(nodes) == 1:
+        return {'package': nodes[0].package, 'executable': nodes[0].name, 'name': nodes[0].name}
+    names = [node.name for node in nodes]
+    return {
+        **{'package': 'surveillance_runtime', 'executable': 'nodes', 'exec_name': process},
+        'arguments': names,
+    }
 
 
 def _count(text: str) -> int | None:

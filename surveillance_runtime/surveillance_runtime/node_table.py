@@ -169,6 +169,24 @@ def process_of(node: str, composition: str = FEW, *, ends_alone: bool = False) -
     return TOGETHER if composition == ONE and not alone else domain
 
 
+def by_process(
+    nodes: Iterable[Node], composition: str = FEW, mode: str | None = None
+) -> dict[str, list[Node]]:
+    """Return the nodes of each process of a run, by its name, see `process_of`.
+
+    Args:
+        nodes: Those of the run.
+        composition: One of `COMPOSITIONS`.
+        mode: In MANUAL the console's `exit NODE` ends one that has modes.
+    """
+    members: dict[str, list[Node]] = {}
+    for node in nodes:
+        alone = mode == 'MANUAL' and node.has_modes
+        name = process_of(node.name, composition, ends_alone=alone)
+        members.setdefault(name, []).append(node)
+    return members
+
+
 SHARED = frozenset(
     ('armor_server', 'ontology_map_builder', 'simulator', 'mission_page', CONSOLE, ALARM)
 )

@@ -78,6 +78,13 @@ OPTIONS = {
             '',
             'a ROS parameter file; it overrides config/parameters.yaml, the robot and the place',
         ),
+        RunOption(
+            'processes',
+            node_table.FEW,
+            'how the nodes share processes: few, so that what guards the base, what knows and what '
+            'records go on without the others; one-each; or one for all that work',
+            node_table.COMPOSITIONS,
+        ),
         RunOption('namespace', '', 'prefix of all ROS names, for a second robot'),
         RunOption(
             'log_level', 'info', 'lowest severity that the nodes print', node_table.LOG_LEVELS

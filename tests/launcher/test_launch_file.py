@@ -19,10 +19,11 @@ import pytest
 from launcher.fleet_launch import parts
 from launcher.run import Run
 from launcher.run_configuration import configuration, profile_of
+from launcher.run_processes import programs_of
 from strict_files.files import FileError
 from surveillance_runtime import discovery
 from surveillance_runtime.configuration import Configuration, file_layer
-from surveillance_runtime.node_table import BEHAVIOURS, MODES, find, select
+from surveillance_runtime.node_table import BEHAVIOURS, COMPOSITIONS, CONSOLE, MODES, find, select
 from surveillance_runtime.parameters import ParameterError
 from surveillance_runtime.run_parameters import WATCHED_STAY
 from tests.launch_stand_ins import Argument, Configured
@@ -36,7 +37,6 @@ PER_RUN = {'record', 'folder', 'console', 'ontologies_folder', 'store', 'place',
 class StartedNode:
     package: str
     executable: str
-    name: str
     namespace: str
     parameters: list[str]
     remappings: list[tuple[str, str]]
@@ -47,11 +47,36 @@ class StartedNode:
     respawn: bool
     respawn_delay: float
     on_exit: Any
+    name: str = ''
+    exec_name: str = ''
+    arguments: list[str] = dataclasses.field(default_factory=list)
+
+    def nodes(self) -> list[StartedNode]:
+        """Return each of the nodes that the process holds, as if it were alone."""
+        if not self.arguments:
+            return [self]
+        return [
+            dataclasses.replace(
+                self,
+                package=find(name).package,
+                executable=name,
+                name=name,
+                parameters=[path],
+                arguments=[],
+            )
+            for name, path in zip(self.arguments, self.parameters, strict=True)
+        ]
 
 
 @pytest.fixture
-def start(monkeypatch, tmp_path):
+def start(processes):
     """Return what runs the launch file with some arguments and gives the nodes it starts."""
+    return lambda **given: [node for each in processes(**given) for node in each.nodes()]
+
+
+@pytest.fixture
+def processes(monkeypatch, tmp_path):
+    """Return what runs the launch file with some arguments and gives the processes it starts."""
     stand_ins: dict[str, dict[str, Any]] = {
         'launch': {'LaunchContext': dict, 'LaunchDescription': list},
         'launch.actions': {
@@ -96,7 +121,8 @@ def settings(node: StartedNode) -> dict[str, object]:
 def test_it_starts_the_same_nodes_with_the_same_values(start, mode, behaviour):
     started = start(mode=mode, behaviour=behaviour)
     wanted = (*select(mode, behaviour), find('alarm'), find('mission_markers'))
-    assert [(n.package, n.executable) for n in started] == [(n.package, n.name) for n in wanted]
+    assert {(n.package, n.executable) for n in started} == {(n.package, n.name) for n in wanted}
+    assert len(started) == len(wanted)
     merged = configuration(ROOT / 'config', Run(mode=mode, behaviour=behaviour))
     for node in started:
         same = {
@@ -116,7 +142,8 @@ def test_the_users_place_parameters_record_and_namespace_reach_the_nodes(start, 
     assert by_name['robot_behavior']['record'] == str(tmp_path / 'it' / 'events.jsonl')
     assert by_name['mission_recorder']['folder'] == str(tmp_path / 'it' / 'recording')
     assert 33 in [values.get('urgency_threshold') for values in by_name.values()]
-    assert 'office.yaml' in Path(nodes[1].parameters[0]).read_text()
+    (builder,) = (node for node in nodes if node.name == 'ontology_map_builder')
+    assert 'office.yaml' in Path(builder.parameters[0]).read_text()
 
 
 def test_a_person_is_called_as_with_launch_py(start, tmp_path):
@@ -244,6 +271,24 @@ def test_a_node_that_cannot_start_ends_the_launch_and_another_one_does_not(start
     assert on_exit(types.SimpleNamespace(returncode=-9, process_name='armor_server-1'), {}) is None
     taken = types.SimpleNamespace(returncode=os.EX_TEMPFAIL, process_name='mission_page-9')
     assert on_exit(taken, {}) is None, 'the mission goes on without a page'
+
+
+@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('composition', COMPOSITIONS)
+def test_its_nodes_share_processes_as_with_launch_py(processes, mode, composition, tmp_path):
+    given = {'mode': mode, 'processes': composition}
+    run = Run(**given, record=str(tmp_path))
+    (part,) = parts(run, ROOT / 'config', profile_of(ROOT / 'config', run))
+    files = dict.fromkeys([node.name for node in part.everyone], tmp_path)
+    # It has no terminal for the console.
+    held = [set(each.names) - {CONSOLE} for each in programs_of(part, files, {})]
+    wanted = {frozenset(names) for names in held if names}
+    started = processes(**given, record=str(tmp_path))
+    assert {frozenset(n.name for n in each.nodes()) for each in started} == wanted
+    together = [each for each in started if each.arguments]
+    assert {(each.package, each.executable, each.name) for each in together} <= {
+        ('surveillance_runtime', 'nodes', '')
+    }
 
 
 def test_it_is_installed_with_the_parameter_files():
