@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import doctest
 import importlib
 import importlib.util
 import itertools
@@ -213,3 +214,21 @@ def test_the_scripts_of_a_page_run(page: str, says: str, tmp_path: Path) -> None
         assert done.returncode == 0, done.stderr
         said += done.stdout
     assert says in said
+
+
+SHOWN = [path for path in FILES if blocks(path, 'pycon')]
+"""Pages whose examples show what they print."""
+
+
+@pytest.mark.parametrize('path', SHOWN, ids=lambda p: f'{p.parent.name}/{p.stem}')
+def test_an_example_prints_what_its_page_says(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    flags = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+    example = doctest.DocTestParser().get_doctest(
+        '\n'.join(blocks(path, 'pycon')), {'__name__': '__main__'}, path.stem, str(path), 0
+    )
+    said: list[str] = []
+    doctest.DocTestRunner(optionflags=flags, verbose=False).run(example, out=said.append)
+    assert not said, ''.join(said)
