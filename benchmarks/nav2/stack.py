@@ -30,6 +30,9 @@ SERVERS = (
 """Package, program, node."""
 CHAIN = ('velocity_smoother', 'collision_monitor')
 """Between the controller and the base."""
+ACKNOWLEDGED_WITHIN = 500
+"""So long may a server take to acknowledge a goal, ms; by default 20, too short for a busy machine,
+on which Nav2 then aborts what it was asked for."""
 MANAGED = 'localization', 'navigation'
 """What each of the two lifecycle managers brings up."""
 NAMED = 'nav2_lifecycle_manager', 'nav2_amcl', 'nav2_map_server'
@@ -120,6 +123,7 @@ class Nav2Stack:
             speed = {'desired_linear_vel': profile.drive.speed}
             merged['controller_server']['ros__parameters']['FollowPath'] = RPP | speed
         merged['map_server'] = {'ros__parameters': {'yaml_filename': str(map_file)}}
+        merged['bt_navigator']['ros__parameters']['default_server_timeout'] = ACKNOWLEDGED_WITHIN
         monitor = merged['collision_monitor']['ros__parameters']
         monitor['FootprintApproach']['footprint_topic'] = 'local_costmap/published_footprint'
         dock = {'dock_plugins': ['simple_charging_dock'], 'simple_charging_dock': DOCK}
