@@ -48,6 +48,14 @@ RETRY_PERIOD = 3.0
 """Seconds after which a recording that could not be written is tried again."""
 BASE_COMMAND = 'cmd_vel_monitored'
 """What the base hears, before a run's remappings."""
+STREAMS = frozenset(
+    (
+        *(f'geometry_msgs/msg/{name}' for name in ('Twist', 'TwistStamped')),
+        *(f'sensor_msgs/msg/{name}' for name in ('CameraInfo', 'Imu', 'JointState', 'LaserScan')),
+        *('nav_msgs/msg/Odometry', 'tf2_msgs/msg/TFMessage'),
+    )
+)
+"""Types of topics on which, unless they are latched, one message soon follows another."""
 OWN = 'surveillance_interfaces/'
 DISK_FULL = errno.ENOSPC, errno.EDQUOT
 QUEUE = 2000
@@ -215,9 +223,13 @@ class MissionRecorder(PatrolNode):
         reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in profiles)
         latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in profiles)
         depth = max((each.depth for each in profiles), default=10) or 10
+        # Each message that is heard reliably is acknowledged: four wakeups of two processes.
+        heard_reliably = reliable and (latched or kind not in STREAMS)
         qos = QoSProfile(
             depth=QUEUE,
-            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            reliability=ReliabilityPolicy.RELIABLE
+            if heard_reliably
+            else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
         )
         try:

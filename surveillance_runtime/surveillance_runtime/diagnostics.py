@@ -35,7 +35,7 @@ from surveillance_runtime.node import PatrolNode
 
 TOPIC = '/diagnostics'
 PERIOD = 1.0
-"""Seconds of real time between two messages of a node."""
+"""Seconds of real time between two messages of a process."""
 STALE_AFTER = 5.0
 """Seconds without a message after which a node's last status says nothing any more."""
 LATE = 0.5
@@ -122,9 +122,9 @@ class DiagnosticsThread:
         self._began = time.monotonic()
         self._lateness = lateness
         self._restarts = _restarts()
-        self._publishers = [
-            (node, node.create_publisher(DiagnosticArray, TOPIC, 10)) for node in nodes
-        ]
+        self._nodes = nodes
+        # One message for all: each costs every listening process several wakeups.
+        self._publisher = nodes[0].create_publisher(DiagnosticArray, TOPIC, 10)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, name='diagnostics', daemon=True)
         self._thread.start()
@@ -133,10 +133,8 @@ class DiagnosticsThread:
         """Publish once more, where a node has failed, and end."""
         self._ended.set()
         self._thread.join()
-        for node, _ in self._publishers:
-            if node.failure is not None:
-                self._publish()
-                return
+        if any(node.failure is not None for node in self._nodes):
+            self._publish()
 
     def _work(self) -> None:
         rounds = 0
@@ -156,7 +154,8 @@ class DiagnosticsThread:
             LAUNCH: launch,
             AGE: f'{age:.1f}',
         }
-        for node, publisher in self._publishers:
+        message = DiagnosticArray()
+        for node in self._nodes:
             name = node.get_fully_qualified_name().removeprefix('/')
             robot = node.get_namespace().strip('/') or 'surveillance_robot'
             status = DiagnosticStatus(name=name, hardware_id=robot)
@@ -169,9 +168,9 @@ class DiagnosticsThread:
             status.message = '; '.join(text for _, text in found) or 'up'
             every = {**figures, **node.health.figures()}
             status.values = [KeyValue(key=key, value=value) for key, value in every.items()]
-            message = DiagnosticArray(status=[status])
-            message.header.stamp = node.get_clock().now().to_msg()
-            publisher.publish(message)
+            message.status.append(status)
+        message.header.stamp = self._nodes[0].get_clock().now().to_msg()
+        self._publisher.publish(message)
 
     def _of_process(self, late: float) -> list[Finding]:
         found: list[Finding] = []

@@ -5,8 +5,9 @@ nodes of one name speak from two launches, their services would be mixed: the la
 younger ends, the other one says so in an incident for as long as it hears the other. Robots that
 are to share a domain have a namespace each, and so other names.
 
-A message is taken for a node's only if the graph says that its publisher is of that node, and one
-message alone counts for nothing: a node that was killed stays in the graph, but says nothing more.
+What is said of a node counts only where the graph says that its publisher is of that node's
+process, and one message alone counts for nothing: a node that was killed stays in the graph, but
+says nothing more.
 
 `python -m surveillance_runtime.duplicate_nodes NODE...` listens before a launch begins, prints
 who is there already, one line each, and ends with exit code 3 if anybody is.
@@ -88,7 +89,7 @@ class DuplicateNodes:
 
         Args:
             node: Its full name.
-            publisher: Its publisher, as the graph knows it for one of this node.
+            publisher: Who said so; the graph knows it for one of this node's process.
             launch: Where it says that it comes from.
             now: Steady time, seconds.
         """
@@ -120,8 +121,11 @@ class DuplicateNodes:
         return max(ages, default=0.0)
 
 
-LONGEST = 16_384
-"""Bytes of what a node of a launch says of itself at most."""
+LONGEST = 65_536
+"""Bytes of what a process of a launch says of its nodes at most."""
+_PARTICIPANT = 12
+"""So many bytes at the beginning of an endpoint's identity are those of its process (RTPS 2.2,
+8.2.4.1)."""
 
 
 class _Ears:
@@ -130,26 +134,35 @@ class _Ears:
     def __init__(self, node: PatrolNode, duplicates: DuplicateNodes) -> None:
         self._node = node
         self._duplicates = duplicates
-        self._named: dict[bytes, str] = {}
+        self._nodes: dict[bytes, set[str]] = {}
+        self._looked_at = -PERIOD
         node.create_subscription(DiagnosticArray, TOPIC, self._on_heard, 50, raw=True)
 
     def _on_heard(self, heard: bytes, info: dict[str, Any]) -> None:
         if len(heard) > LONGEST:
-            return  # no node of a launch says so much of itself
+            return  # no process of a launch says so much
         publisher = info.get(SOURCE, b'')
-        if publisher not in self._named:
-            self._named = publishers_of(self._node, TOPIC)
-        speaker = self._named.get(publisher)
         for status in deserialize_message(heard, DiagnosticArray).status:
             name = f'/{status.name}'
             values = {each.key: each.value for each in status.values}
-            if name != speaker or name.rpartition('/')[2] not in RUN_NODES or LAUNCH not in values:
+            if name.rpartition('/')[2] not in RUN_NODES or LAUNCH not in values:
+                continue
+            if not self._is_of(name, publisher):
                 continue
             try:
                 launch = Launch(values[LAUNCH], float(values[AGE]))
             except (KeyError, ValueError):
                 continue
             self._duplicates.hear(name, publisher, launch, time.monotonic())
+
+    def _is_of(self, name: str, publisher: bytes) -> bool:
+        """Return whether a node is in the process of a publisher."""
+        process, now = publisher[:_PARTICIPANT], time.monotonic()
+        if name not in self._nodes.get(process, ()) and now - self._looked_at >= PERIOD:
+            self._looked_at, self._nodes = now, {}
+            for log, node in publishers_of(self._node, '/rosout').items():  # every node has one
+                self._nodes.setdefault(log[:_PARTICIPANT], set()).add(node)
+        return name in self._nodes.get(process, ())
 
 
 class DuplicateNodeWatch:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
 
 from surveillance_runtime import duplicate_nodes
 from surveillance_runtime.duplicate_nodes import DuplicateNodes, DuplicateNodeWatch, Launch
@@ -45,10 +48,24 @@ def test_one_message_says_nothing() -> None:
 def speaker(graph: Any, name: str, says: str, launch: Launch) -> None:
     """Have a node tell of its launch as each node does, under some name."""
     node = graph.add(PatrolNode, name=name)
-    publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    repeat(node, node.create_publisher(DiagnosticArray, '/diagnostics', 10), says, launch)
+
+
+def repeat(node: PatrolNode, publisher: Any, says: str, launch: Launch) -> None:
     values = [KeyValue(key=LAUNCH, value=launch.name), KeyValue(key=AGE, value=str(launch.age))]
-    message = DiagnosticArray(status=[DiagnosticStatus(name=says, values=values)])
-    node.create_timer(0.05, lambda: publisher.publish(message))
+    said = [DiagnosticStatus(name=each, values=values) for each in says.split()]
+    node.create_timer(0.05, lambda: publisher.publish(DiagnosticArray(status=said)))
+
+
+@pytest.fixture
+def stranger() -> Iterator[Node]:
+    """Provide a node of another process; ask for it before the graph that publishes with it."""
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context)
+    node = Node('stranger', context=context)
+    yield node
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
 
 
 @pytest.fixture
@@ -69,15 +86,27 @@ def test_the_younger_robot_ends_and_names_the_other(graph: Any) -> None:
 
 
 @pytest.mark.usefixtures('quick')
-def test_the_older_robot_goes_on_and_tells(graph: Any) -> None:
+def test_the_older_robot_goes_on_and_tells(stranger: Node, graph: Any) -> None:
     own, _ = launch_of_process()
     speaker(graph, 'armor_server', 'armor_server', Launch(own, 5000.0))
     speaker(graph, 'armor_server', 'armor_server', OLD)
     # Somebody else who says that it is one of the robot's nodes is not believed.
-    speaker(graph, 'stranger', 'motion_controller', Launch('elsewhere, process 1', 9e9))
-    speaker(graph, 'motion_controller', 'motion_controller', Launch(own, 5000.0))
     watching = graph.add(PatrolNode, name='robot_behavior')
+    foreign = stranger.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    graph.until(lambda: watching.count_publishers('/diagnostics') >= 3)
+    repeat(watching, foreign, 'armor_server', Launch('elsewhere, process 1', 9e9))
     DuplicateNodeWatch(watching)
     graph.until(watching.incidents.open)
     assert [str(each) for each in watching.incidents.open()] == ['robot desk, process 7']
     assert watching.failure is None
+
+
+@pytest.mark.usefixtures('quick')
+def test_one_message_speaks_for_all_nodes_of_a_process(graph: Any) -> None:
+    own, _ = launch_of_process()
+    speaker(graph, 'armor_server', 'armor_server planner_controller', Launch(own, 1.0))
+    speaker(graph, 'planner_controller', 'planner_controller', OLD)
+    watching = graph.add(PatrolNode, name='robot_behavior')
+    DuplicateNodeWatch(watching)
+    graph.until(lambda: watching.failure)
+    assert '/planner_controller; expected' in watching.failure
