@@ -6,10 +6,7 @@ import ast
 import doctest
 import importlib
 import importlib.util
-import itertools
-import json
 import re
-import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -20,11 +17,8 @@ import pytest
 import yaml
 
 from indoor_watch.watch_rules import read_watch_file
-from launcher.completion import options_in
-from launcher.package_commands import HELP
 from patrol_policy.hours import WeeklyHours
 from surveillance_operator.notify.sinks import read_notify_file
-from surveillance_runtime.configuration import read_schema
 
 ROOT = Path(__file__).parents[1]
 
@@ -107,52 +101,6 @@ def test_links_lead_somewhere_and_pictures_have_words(path: Path) -> None:
         there = (path.parent / name).resolve() if name else path
         assert there.exists(), target
         assert not anchor or anchor in anchors(there), target
-
-
-def command_lines() -> list[tuple[str, list[str]]]:
-    """Return the page and words of each command of the launcher that a reader types."""
-    found = []
-    for path in [*DONE, ROOT / 'README.md', ROOT / 'CONTRIBUTING.md']:
-        for code in blocks(path, 'sh', 'console', ''):
-            for line in code.splitlines():
-                match = re.search(r'python3 launch\.py(.*)', line)
-                if match and '[' not in match[1].split('--')[0]:
-                    typed = re.split(r'\s[>|#]\s|\)"', match[1])[0]
-                    found.append((path.stem, shlex.split(typed)))
-    return found
-
-
-@pytest.fixture(scope='module')
-def helps() -> dict[str, str]:
-    """Return what each command says to `--help`."""
-    page = (ROOT / 'docs' / 'reference' / 'cli.md').read_text(encoding='utf-8')
-    parts = re.findall(
-        r'^## launch\.py ?(\S*)\n\n```text\n(.*?)```', page, re.MULTILINE | re.DOTALL
-    )
-    return dict(parts) | json.loads(HELP.read_text(encoding='utf-8'))
-
-
-@pytest.mark.parametrize(('page', 'typed'), command_lines())
-def test_a_command_is_one(page: str, typed: list[str], helps: dict[str, str]) -> None:
-    is_run = not typed or typed[0].startswith('-')
-    command = '' if is_run else typed[0]
-    if command in ('completion', 'test', 'lint'):
-        return
-    assert command in helps
-    known = {*options_in(helps[command]), '-p', '-h'}
-    if command == 'service':
-        known |= set(options_in(helps['']))
-    if '--ros-args' in typed:
-        typed = typed[: typed.index('--ros-args')]
-    assert {word for word in typed if word.startswith('-')} <= known, page
-    nodes = read_schema()
-    for before, assigned in itertools.pairwise(typed):
-        if before == '-p':
-            name, _, _ = assigned.partition(':=')
-            node, _, parameter = name.rpartition(':')
-            tables = [nodes[node]] if node else list(nodes.values())
-            known_names = {each for table in tables for each in table.parameters}
-            assert parameter in {*known_names, 'use_sim_time'}, assigned
 
 
 @pytest.mark.parametrize('path', DONE, ids=lambda p: p.stem)
