@@ -157,6 +157,7 @@ class Reference:
         cancel: Set to end the reasoning that runs.
         revision: Counts what may have changed an answer, so that copies know when they are old.
         dropped: The name does not stand for it any more.
+        on_open: Told that it was reasoned over for the first time in this process.
         on_applied: Told which directives' changes were applied, before anybody reasons over them.
         on_reasoning: Told over which of the untested changes is reasoned, or `WHOLE`; and None at
             the end.
@@ -177,6 +178,7 @@ class Reference:
     revision: int = 0
     dropped: bool = False
     lock: threading.RLock = field(default_factory=threading.RLock)
+    on_open: Callable[[], None] = lambda: None
     on_applied: Callable[[list[Submission]], None] = lambda _: None
     on_reasoning: Callable[[int | None], None] = lambda _: None
     on_completed: Callable[[], None] = lambda: None
@@ -200,7 +202,9 @@ class Reference:
         if not self.opened:
             self.opened = True
             with contextlib.suppress(TooHardError):
-                self._derive()
+                # It is no change, and nobody has asked yet.
+                self._derive(tell=False)
+            self.on_open()
 
     def submit(self, told: Submission) -> str:
         """Take changes in, at once or into the queue, as the reference is set up.
@@ -312,7 +316,7 @@ class Reference:
         if not self.buffering.reasoner and not self.too_hard:
             self._derive()
 
-    def _derive(self, timeout: float = math.inf) -> None:
+    def _derive(self, timeout: float = math.inf, tell: bool = True) -> None:
         """Bring the derived facts up to date, without the changes that are too hard.
 
         Raises:
@@ -329,7 +333,7 @@ class Reference:
             if self.quarantine.is_given_up and timeout == math.inf:
                 self._roll_back(self.quarantine.ends)
             else:
-                self._reason(WHOLE, timeout)
+                self._reason(WHOLE, timeout, tell)
         except ReasoningBudgetError as error:
             self.revision += 1
             if error.limit == 'cancelled' or timeout < math.inf:
@@ -341,7 +345,7 @@ class Reference:
         self.too_hard = ''
         self.on_completed()
 
-    def _reason(self, place: int, timeout: float = math.inf) -> None:
+    def _reason(self, place: int, timeout: float = math.inf, tell: bool = True) -> None:
         """Reason once, within the limits; `place` says over which of the changes."""
         count = sum(len(told.changes) for told in self.quarantine.untested)
         if self.kb.starts_anew or self.effort.base == 0.0 or self.quarantine.origin:
@@ -349,7 +353,7 @@ class Reference:
         seconds = min(timeout, self.effort.limits.of(self.effort.base, count))
         self.on_reasoning(place)
         try:
-            self.kb.reason(seconds, self.cancel, memory=self.effort.limits.memory)
+            self.kb.reason(seconds, self.cancel, memory=self.effort.limits.memory, tell=tell)
         finally:
             self.on_reasoning(None)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -131,6 +132,45 @@ def test_a_value_that_is_assigned_is_an_ordinary_change(served: Served) -> None:
 
 
 VISIT = ('QUERY DATAPROP IND', 'visitedAt', 'R1')
+
+
+def test_what_is_written_while_the_service_is_off_is_the_same_change(served: Served) -> None:
+    text = """
+with onto:
+    onto.R1.visitedAt = [1665579999]
+    onto.R2.hasDoor.append(onto.DOOR('D9'))
+    class ATTIC(onto.ROOM): pass
+    ATTIC.is_a.append(onto.hasDoor.max(1, onto.DOOR))
+    AllDifferent([onto.D9, onto.D1])
+    onto.R3.iri = IRI + '#Kitchen'
+    destroy_entity(onto.R4)
+world.save()
+"""
+    questions = [
+        ('QUERY AXIOMS', name) for name in ('R1', 'R2', 'R3', 'Kitchen', 'R4', 'ATTIC', 'D1', 'D9')
+    ] + [('QUERY IND CLASS', name) for name in ('ROOM', 'CORRIDOR', 'DOOR')]
+
+    def asked() -> list[list[str]]:
+        return [sorted(served.ask(*words).queried_objects) for words in questions]
+
+    served.service.close()
+    copy = served.path.with_name('copy.sqlite3')
+    shutil.copy(served.path, copy)
+    served.run(text)
+    served.start()
+    assert '"1665579999"^^xsd:long' in str(served.ask('QUERY DATAPROP IND', 'visitedAt', 'R1'))
+    assert served.ask('REASON').is_consistent
+    after_a_start = asked()
+    served.service.close()
+    shutil.copy(copy, served.path)
+    copy.unlink()
+    served.start()
+    served.run(text)
+    served.until(lambda: 'Kitchen' in served.names('QUERY IND CLASS', 'ROOM'))
+    assert asked() == after_a_start
+    served.service.close()
+    served.start()
+    assert asked() == after_a_start
 
 
 def test_individuals_classes_properties_and_rules_come_by_owlready2s_idioms(

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import owlready2
 import pytest
 
 from armor_service.access import Settings
@@ -62,9 +63,8 @@ class Served:
 
     def start(self) -> None:
         settings = Settings(self._folder, reasoning_timeout=0.1, reasoning_memory=200)
-        self.service = ArmorService(
-            settings, print, self.notes.append, Store(self._folder / 'store')
-        )
+        self.store = Store(self._folder / 'store')
+        self.service = ArmorService(settings, print, self.notes.append, self.store)
         self.ask: Ask = asker(self.service)
 
     def load(self, name: str, lazy: str) -> Ask:
@@ -146,6 +146,27 @@ def test_what_was_not_reasoned_over_before_a_restart_is_taken_back_after_it(
     assert len(ask('QUERY TAKEN BACK').queried_objects) == 1
     ask = served.restart()
     assert ask('QUERY IND CLASS', 'M').queried_objects == [f'<{T}#x>', f'<{T}#y>']
+
+
+def test_what_is_too_hard_and_came_while_the_service_was_off_takes_nothing_else_with_it(
+    served: Served,
+) -> None:
+    ask = served.load('products', 'false')
+    assert ask('ADD IND CLASS', 'x', 'M').success
+    path = served.store.path('hard')
+    served.service.close()
+    world = owlready2.World(filename=str(path), exclusive=False)
+    with world.get_ontology(T).load():
+        world[f'{T}#T']('t')
+    world.save()
+    world.close()
+    served.start()
+    ask = asker(served.service, 'hard')
+    assert ask('QUERY IND CLASS', 'M').queried_objects == [f'<{T}#x>']
+    assert len(ask('QUERY IND CLASS', 'N').queried_objects) == COUNT
+    assert ask('QUERY IND CLASS', 'T').queried_objects == []
+    (line,) = ask('QUERY TAKEN BACK').queried_objects
+    assert "of client 'file'" in line
 
 
 @pytest.mark.parametrize('place', [-1, 1])

@@ -180,8 +180,11 @@ class Derivation:
                     pending.append(sub)
         return set(found)
 
-    def reason(self) -> bool:
+    def reason(self, tell: bool = True) -> bool:
         """Bring what is derived up to date; return whether the ontology is consistent.
+
+        Args:
+            tell: Tell subscribers what a new engine shows.
 
         Raises:
             ReasoningBudgetError: See `KnowledgeBase.reason`; nothing is derived then.
@@ -189,7 +192,7 @@ class Derivation:
         changes, before, budget = self._told.unsettled(), self.engine, self.budget
         took_cases = self.completion is not None and self.completion.seconds > 0
         try:
-            self.bring_up_to_date()
+            self.bring_up_to_date(tell)
         except BaseException as error:
             where = budget.at_work() or budget.stage
             self._give_up(before, changes)
@@ -202,7 +205,7 @@ class Derivation:
         self.interrupted = False
         return self.consistent
 
-    def bring_up_to_date(self) -> None:
+    def bring_up_to_date(self, tell: bool = True) -> None:
         """Derive what follows now, with as little work as the change allows."""
         engine, told = self.engine, self._told
         # A change of classes is a new classification: it takes a second where the ontology is
@@ -215,7 +218,7 @@ class Derivation:
                 self.completion = self._completion_of(engine)
                 self._update(engine, partial(self._adopt, engine, change))
             else:
-                self._rebuild(engine)
+                self._rebuild(engine, tell)
         elif told.added or told.removed:
             added, removed = told.settle()
             if self.completion is not None:
@@ -272,8 +275,8 @@ class Derivation:
         engine.update(added, ())
         self.snapshots.clear()
 
-    def _rebuild(self, old: Engine | None) -> None:
-        before = self.notifier.shown_by(old) if self.notifier else set()
+    def _rebuild(self, old: Engine | None, tell: bool) -> None:
+        before = self.notifier.shown_by(old) if self.notifier and tell else set()
         assert self.classification is not None
         engine = self.engine = Engine(self.classification.program, self._told, self.budget)
         if old is not None:
@@ -290,7 +293,9 @@ class Derivation:
         self.consistent = engine.consistent
         self.snapshots.clear()
         self._watched.clear()
-        if self.notifier:
+        if not tell:
+            self.notifier.began(engine)
+        elif self.notifier:
             self.notifier.replaced(before, engine)
 
     def _give_up(self, before: Engine | None, changes: Unsettled) -> None:

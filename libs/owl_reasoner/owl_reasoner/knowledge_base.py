@@ -78,14 +78,12 @@ class KnowledgeBase:
     ) -> None:
         self.iri = iri
         self._clock, self._budget = clock, Budget(clock)
-        self._told = Assertions()
+        # 100,000 axioms are no garbage: the collector would walk them again and again.
+        with uncollected():
+            self._told = Assertions(axioms)
         self._derived = Derivation(self._told, self._budget)
         self._justifications = Justifications(self._told, self._derived)
         self.patience = math.inf
-        # 100,000 axioms are no garbage: the collector would walk them again and again.
-        with uncollected():
-            for axiom in axioms:
-                self._told.insert(axiom)
 
     # --- asserted axioms ---
 
@@ -546,6 +544,7 @@ class KnowledgeBase:
         *,
         memory: float = math.inf,
         steps: float = math.inf,
+        tell: bool = True,
     ) -> bool:
         """Bring what is derived up to date; return whether the ontology is consistent.
 
@@ -562,6 +561,7 @@ class KnowledgeBase:
             memory: Bytes by which the process may grow; looked at on Linux alone.
             steps: Units of work after which to end, each of about a microsecond. The same work
                 takes the same number on every machine.
+            tell: Tell subscribers what is derived where it is derived from nothing; else they ask.
 
         Raises:
             ReasoningBudgetError: A limit was passed, or `cancel` said so; it names the axiom or
@@ -569,12 +569,12 @@ class KnowledgeBase:
         """
         self._budget.begin(timeout, cancel, progress, memory, steps)
         try:
-            return self._derived.reason()
+            return self._derived.reason(tell)
         finally:
             self._budget.finish()
 
     def revert(self) -> int:
-        """Take back every change since the last `reason` that completed.
+        """Take back every change since the last `reason` that completed, or since this was made.
 
         Returns:
             The number of axioms that changed.

@@ -72,7 +72,8 @@ class Notifier:
 
     def replaced(self, before: set[Axiom], engine: Engine) -> None:
         """Tell what a new engine shows that the old one did not, and the reverse."""
-        after = self._show(engine)
+        after = visible(engine)
+        self._show(engine)
         self._derived(engine, after - before, before - after)
 
     def updating(self, engine: Engine, update: Callable[[], None]) -> None:
@@ -108,11 +109,14 @@ class Notifier:
                     gone += view.public(fact, {})
         self._derived(engine, come, gone)
 
-    def _show(self, engine: Engine | None) -> set[Axiom]:
-        shown = visible(engine)
+    def began(self, engine: Engine) -> None:
+        """Take what a new engine shows for known, without telling it."""
+        self._show(engine)
+        self._consistent = engine.consistent
+
+    def _show(self, engine: Engine | None) -> None:
         special = engine is not None and (not engine.consistent or bool(engine.equality.members))
-        self._shown = shown if special else None
-        return shown
+        self._shown = visible(engine) if special else None
 
     def _derived(self, engine: Engine, come: Iterable[Axiom], gone: Iterable[Axiom]) -> None:
         come, gone = dict.fromkeys(come), dict.fromkeys(gone)

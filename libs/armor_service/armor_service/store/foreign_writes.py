@@ -64,7 +64,7 @@ class ForeignWrites:
         self._tell_others(ref, rows.others)
         kb = ref.kb
         changes = self._renamed(ref, ontology, rows.renamed)
-        found = self._read(ref, ontology, rows)
+        found = self._read(ontology, rows)
         for number in rows.forgotten:
             self._file.names.forget(number)
         replacing: list[SetAssertion] = []
@@ -72,8 +72,15 @@ class ForeignWrites:
             replacing.append(SetAssertion(typed))
             found.added.remove(axiom)
             self._lacking.net[axiom] = -1
-        changes += [RemoveAxiom(axiom) for axiom in found.removed if axiom in kb]
-        changes += [AddAxiom(axiom) for axiom in found.added if axiom not in kb]
+        come = {change.axiom for change in changes if isinstance(change, AddAxiom)}
+        gone = {change.axiom for change in changes} - come
+
+        def holds(axiom: Axiom) -> bool:
+            """Tell whether it is there once things have their new names."""
+            return axiom in come or (axiom in kb and axiom not in gone)
+
+        changes += [RemoveAxiom(axiom) for axiom in found.removed if holds(axiom)]
+        changes += [AddAxiom(axiom) for axiom in found.added if not holds(axiom)]
         if not changes and not replacing:
             return None
         delta = self._lacking.merge(kb, changes, replacing)
@@ -115,7 +122,7 @@ class ForeignWrites:
             changes += [AddAxiom(axiom) for axiom in after.values()]
         return changes
 
-    def _read(self, ref: Reference, ontology: WorldOntology, rows: ForeignRows) -> AxiomsRead:
+    def _read(self, ontology: WorldOntology, rows: ForeignRows) -> AxiomsRead:
         """Read the quads; what is no OWL is undone as a whole."""
         db = self._file.open()
         db.execute('SAVEPOINT foreign_changes')
@@ -123,7 +130,6 @@ class ForeignWrites:
         if found.problems:
             db.execute('ROLLBACK TO foreign_changes')
             self._refuse(ontology, rows, found.problems)
-            self._forget_refused(ref, found)
             found = AxiomsRead()
         db.execute('RELEASE foreign_changes')
         return found
@@ -145,11 +151,3 @@ class ForeignWrites:
             f'what another program wrote is no OWL and undone: {problems[0]}{more}; '
             f'it is kept in {aside.name}'
         )
-
-    def _forget_refused(self, ref: Reference, found: AxiomsRead) -> None:
-        """Take back what was read of it when the file was opened."""
-        kb, net = ref.kb, self._lacking.net
-        known = [axiom for axiom in found.added if axiom in kb and net.get(axiom) != 1]
-        gone = [axiom for axiom in found.removed if axiom not in kb and net.get(axiom) != -1]
-        with self._lacking.already_written():
-            kb.change(gone, known)

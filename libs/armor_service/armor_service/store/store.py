@@ -118,6 +118,7 @@ class Store:
         self.warn(text)
 
     def _note_reasoning(self, ref: Reference) -> None:
+        ref.on_open = partial(self.take_in, ref)
         ref.on_reasoning = partial(self._reasoning.note, ref.name)
         ref.on_completed = partial(self._reasoning.completed, ref.name)
 

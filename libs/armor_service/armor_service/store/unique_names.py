@@ -7,7 +7,7 @@ What is not exactly such a list is left to whoever reads the other axioms.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 
@@ -41,7 +41,7 @@ class DifferentList(NamedTuple):
 
 
 def different_lists(
-    quads: list[tuple[Any, ...]], links: Iterable[tuple[int, int, int]], words: ListWords
+    quads: list[tuple[Any, ...]], links: Sequence[tuple[int, int, int]], words: ListWords
 ) -> tuple[list[DifferentList], list[tuple[Any, ...]]]:
     """Take the lists of different individuals out of quads.
 
@@ -58,14 +58,12 @@ def different_lists(
     for quad in quads:
         if quad[0] in heads:
             of_head[quad[0]].append(quad)
-    firsts: dict[int, int] = {}
-    rests: dict[int, int] = {}
+    firsts = {node: value for node, predicate, value in links if predicate == words.first}
+    rests = {node: value for node, predicate, value in links if predicate != words.first}
     twice: list[tuple[int, int, int]] = []
-    for link in links:
-        node, predicate, value = link
-        chosen = firsts if predicate == words.first else rests
-        if chosen.setdefault(node, value) != value:
-            twice.append(link)
+    if len(firsts) + len(rests) != len(links):
+        ends = {words.first: firsts, words.rest: rests}
+        twice = [link for link in links if ends[link[1]][link[0]] != link[2]]
     found = []
     # Whoever names a node of a list otherwise keeps the list from being read here.
     named = Counter(quad[0] for quad in quads)

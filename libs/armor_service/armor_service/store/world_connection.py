@@ -270,12 +270,20 @@ class WorldConnection:
         Args:
             asserted, inferred: The numbers of the two ontologies.
         """
+        found = self.foreign(asserted, inferred)
+        if found is not None:
+            db = self.open()
+            db.execute('DELETE FROM armor_changes')
+            self._version = self._data_version(db)
+        return found
+
+    def foreign(self, asserted: int, inferred: int = 0) -> ForeignRows | None:
+        """Return what `take_foreign` would, and leave it there."""
         db = self.open()
         rows = db.execute('SELECT event, c, s, p, o, d FROM armor_changes ORDER BY id').fetchall()
-        self._version = self._data_version(db)
         if not rows:
+            self._version = self._data_version(db)
             return None
-        db.execute('DELETE FROM armor_changes')
         found = ForeignRows()
         net: dict[Quad, int] = {}
         for event, c, s, p, o, d in rows:

@@ -28,7 +28,13 @@ from armor_service.store.lock_holder import lock_holder
 from armor_service.store.records import submission_of
 from armor_service.store.spill import Spill
 from armor_service.store.unwritten import Remembered, Unwritten
-from armor_service.store.world_connection import ANONYMOUS, BUSY, INFERRED, WorldConnection
+from armor_service.store.world_connection import (
+    ANONYMOUS,
+    BUSY,
+    INFERRED,
+    ForeignRows,
+    WorldConnection,
+)
 from armor_service.store.write_failure import WriteFailure
 from owl_reasoner.owl.axioms import Axiom
 
@@ -130,7 +136,10 @@ class WorldFile:
         # Others may be about to write: nothing is, until they are done.
         db.execute('BEGIN')
         try:
-            found = self.connection.asserted(state['iri']).read()
+            ontology = self.connection.asserted(state['iri'])
+            # What others wrote meanwhile is a change of what was there before.
+            others = self.connection.foreign(ontology.context) or ForeignRows()
+            found = ontology.read(others.come, others.gone, others.renamed)
             ref = self._reference(state, found.added)
             self._remembered.read(db, ref, state)
         finally:
@@ -337,9 +346,9 @@ class WorldFile:
         """Tell whether `attend` has something to do; asked without the reference's lock."""
         if self._failure.text:
             return self._failure.may_be_tried
-        if self._lacking.whole or self.connection.db is None:
-            return False  # It is being made.
-        return (not self._lacking.derived_known and self.ref.opened) or self.has_foreign()
+        if self._lacking.whole or self.connection.db is None or not self.ref.opened:
+            return False  # It is being made, or its `open` attends to it.
+        return not self._lacking.derived_known or self.has_foreign()
 
     # --- the rest ---
 

@@ -10,7 +10,7 @@ as, so that it can be removed again, whoever wrote it.
 from __future__ import annotations
 
 import sqlite3
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -35,6 +35,7 @@ RESERVED = 300
 _TYPE = RDF + 'type'
 _BUILT_IN = (OWL, RDF, RDFS, XSD, SWRL)
 _AXIOM = OWL + 'Axiom'
+_OBJECT_PROPERTY, _DATA_PROPERTY = frozenset(('object_property',)), frozenset(('data_property',))
 
 
 class WorldNames:
@@ -42,18 +43,22 @@ class WorldNames:
 
     Args:
         db: The file.
+
+    Attributes:
+        names: The names that are known, by their numbers.
     """
 
     def __init__(self, db: sqlite3.Connection) -> None:
         self._db = db
         self._numbers: dict[str, int] = {}
-        self._names: dict[int, str] = {}
+        self.names: dict[int, str] = {}
         self._new: list[str] = []
 
-    def read_all(self) -> None:
-        """Ask for all names at once."""
-        self._names = dict(self._db.execute('SELECT storid, iri FROM resources'))
-        self._numbers = {name: number for number, name in self._names.items()}
+    def read_all(self, renamed: Iterable[tuple[int, str]] = ()) -> None:
+        """Ask for all names at once; know some by the names that they had before."""
+        self.names.update(self._db.execute('SELECT storid, iri FROM resources'))
+        self.names.update(renamed)
+        self._numbers = {name: number for number, name in self.names.items()}
 
     def number(self, name: str) -> int:
         """Return the number of a name, a new one where it has none."""
@@ -67,7 +72,7 @@ class WorldNames:
                 execute('INSERT INTO resources VALUES (?, ?)', (row[0], name))
                 self._new.append(name)
             found = self._numbers[name] = row[0]
-            self._names[found] = name
+            self.names[found] = name
         return found
 
     def find(self, name: str) -> int:
@@ -76,17 +81,17 @@ class WorldNames:
             row = self._db.execute('SELECT storid FROM resources WHERE iri=?', (name,)).fetchone()
             if row is None:
                 return 0
-            self._numbers[name], self._names[row[0]] = row[0], name
+            self._numbers[name], self.names[row[0]] = row[0], name
         return self._numbers[name]
 
     def name(self, number: int) -> str:
         """Return the name of a number; '' where it has none."""
-        found = self._names.get(number)
+        found = self.names.get(number)
         if found is None:
             row = self._db.execute('SELECT iri FROM resources WHERE storid=?', (number,)).fetchone()
             if row is None:
                 return ''
-            found = self._names[number] = row[0]
+            found = self.names[number] = row[0]
             self._numbers[row[0]] = number
         return found
 
@@ -97,11 +102,11 @@ class WorldNames:
 
     def remember(self, number: int, name: str) -> None:
         """Know the name that a number had until somebody else took it away."""
-        self._names.setdefault(number, name)
+        self.names.setdefault(number, name)
 
     def forget(self, number: int) -> None:
         """Ask anew for a number that somebody else changed."""
-        self._numbers.pop(self._names.pop(number, ''), None)
+        self._numbers.pop(self.names.pop(number, ''), None)
 
     def committed(self) -> None:
         """Keep the numbers that were given out since the last call."""
@@ -110,7 +115,7 @@ class WorldNames:
     def rolled_back(self) -> None:
         """Forget the numbers that were given out since."""
         for name in self._new:
-            self._names.pop(self._numbers.pop(name, 0), None)
+            self.names.pop(self._numbers.pop(name, 0), None)
         self._new.clear()
 
 
@@ -166,7 +171,7 @@ class WorldOntology:
         self._declares = declare
         self._base = iri if iri.endswith('/') else f'{iri}#'
         self.context = self._context()
-        self._kinds: dict[str, set[str]] = {}
+        self._kinds: dict[str, frozenset[str]] = {}
         self._declared: set[tuple[str, str]] = set()
         self._labels: dict[str, int] = {}
         self._label_of: dict[int, str] = {}
@@ -378,11 +383,10 @@ class WorldOntology:
         return self._number(name), self._type, self._number(KIND_TYPES[kind])
 
     def _kind(self, name: str, kind: str, *, there: bool = True) -> None:
-        kinds = self._kinds.setdefault(name, set())
-        if there == (kind in kinds):
-            return
-        (kinds.add if there else kinds.discard)(kind)
-        self._undo.append(lambda: (kinds.discard if there else kinds.add)(kind))
+        before = self._kinds.get(name, frozenset())
+        if there != (kind in before):
+            self._kinds[name] = before ^ {kind}
+            self._undo.append(lambda: self._kinds.__setitem__(name, before))
 
     def _declare_only(self, entity: tuple[str, str], *, remove: bool = False) -> None:
         """Remember that something is declared although nothing else is said of it."""
@@ -427,38 +431,55 @@ class WorldOntology:
 
     # --- reading ---
 
-    def read(self) -> AxiomsRead:
-        """Read all axioms."""
+    def read(
+        self,
+        come: Iterable[Quad] = (),
+        gone: Iterable[Quad] = (),
+        renamed: Iterable[tuple[int, str]] = (),
+    ) -> AxiomsRead:
+        """Read all axioms, as they were before somebody changed some.
+
+        Args:
+            come, gone: Quads that he wrote and took away.
+            renamed: Numbers to which he gave another name, with the one before.
+        """
         execute, c = self._db.execute, self.context
-        self._names.read_all()
+        self._names.read_all(renamed)
         self._labels = dict(execute('SELECT label, node FROM armor_nodes'))
         self._label_of = {number: label for label, number in self._labels.items()}
         self._declared = set(execute('SELECT kind, name FROM armor_declared'))
-        self._kinds = self._declarations()
         self._places, self._undo = {}, []
         self._shared.clear()
         words = self._list_words()
         found = AxiomsRead()
         rest: list[Quad] = []
-        kinds = ','.join(map(str, self._kind_types))
-        # Declarations are known by now, and links of lists are read by themselves.
-        query = (
-            f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} AND p NOT IN (?, ?) '
-            f'AND NOT (p=? AND s>0 AND o IN ({kinds})) ORDER BY rowid'
-        )
-        objs = execute(query, (*words[-2:], words.type))
-        datas = execute(f'SELECT s, p, o, d FROM datas NOT INDEXED WHERE c={c} ORDER BY rowid')
-        for quad in chain(objs, datas):
+        without = set(come)
+        put_back: dict[str, list[Quad]] = defaultdict(list)
+        for quad in gone:
+            put_back[self._part_of(quad, words)].append(quad)
+
+        def rows(part: str, columns: str, table: str, where: str) -> Iterable[Quad]:
+            query = f'SELECT {columns} FROM {table} NOT INDEXED WHERE c={c}{where} ORDER BY rowid'
+            found = execute(query)
+            there = (quad for quad in found if quad not in without) if without else found
+            return chain(there, put_back[part])
+
+        # Declarations first, by which the others are read; links of lists by themselves.
+        links, kinds = words[-2:], ','.join(map(str, self._kind_types))
+        declares = f'p={self._type} AND s>0 AND o IN ({kinds})'
+        self._kinds = self._read_kinds(rows('kind', 's, p, o', 'objs', f' AND {declares}'))
+        apart = f' AND p NOT IN {links} AND NOT ({declares})'
+        objs = rows('relation', 's, p, o', 'objs', apart)
+        datas = rows('value', 's, p, o, d', 'datas', '')
+        odd = chain(self._read_relations(objs, found.added), self._read_values(datas, found.added))
+        for quad in odd:
             axiom = self._fact(quad)
             if axiom is None:
                 rest.append(quad)
             else:
                 found.added.append(axiom)
-        links = execute(
-            f'SELECT s, p, o FROM objs NOT INDEXED WHERE c={c} AND p IN (?, ?) ORDER BY rowid',
-            words[-2:],
-        )
-        lists, rest = different_lists(rest, links, words)
+        linked = list(rows('link', 's, p, o', 'objs', f' AND p IN {links}'))
+        lists, rest = different_lists(rest, linked, words)
         others, found.problems = self._mapped(rest)
         others += dict.fromkeys(self._different(*one) for one in lists)
         found.added = [*others, *found.added]
@@ -478,18 +499,50 @@ class WorldOntology:
         self._stand(axiom, AxiomQuads((*before.nodes, *nodes), before.quads))
         return axiom
 
-    def _declarations(self) -> dict[str, set[str]]:
+    def _part_of(self, quad: Quad, words: ListWords) -> str:
+        """Return in which part of the quads `read` comes upon one."""
+        if len(quad) == 4:
+            return 'value'
+        if quad[1] in words[-2:]:
+            return 'link'
+        declares = quad[1] == self._type and quad[0] > 0 and quad[2] in self._kind_types
+        return 'kind' if declares else 'relation'
+
+    def _read_kinds(self, quads: Iterable[Quad]) -> dict[str, frozenset[str]]:
         """Return as what each name is declared."""
-        kinds: dict[str, set[str]] = {}
-        chosen = ','.join(map(str, self._kind_types))
-        query = (
-            f'SELECT s, o FROM objs WHERE c={self.context} AND p={self._type} AND o IN ({chosen})'
-        )
-        for subject, kind in self._db.execute(query):
-            if subject > 0:
-                name = self._names.name(subject)
-                kinds.setdefault(name, set()).add(self._kind_types[kind])
+        kinds: dict[str, frozenset[str]] = {}
+        name = self._names.name
+        alone = {number: frozenset((kind,)) for number, kind in self._kind_types.items()}
+        for s, _, o in quads:
+            declared, only = name(s), alone[o]
+            kinds[declared] = kinds[declared] | only if declared in kinds else only
         return kinds
+
+    def _read_relations(self, quads: Iterable[Quad], found: list[Axiom]) -> Iterator[Quad]:
+        """Read relations of individuals that have names, as `_fact` does; yield other quads."""
+        names, relating = self._names.names, self._numbers_of(_OBJECT_PROPERTY)
+        for quad in quads:
+            s, p, o = quad
+            if p in relating and s > RESERVED and o > RESERVED:
+                found.append(ax.ObjectPropertyAssertion(relating[p], names[s], names[o]))
+            else:
+                yield quad
+
+    def _read_values(self, quads: Iterable[Quad], found: list[Axiom]) -> Iterator[Quad]:
+        """Read values of individuals that have names, as `_fact` does; yield other quads."""
+        names, valued = self._names.names, self._numbers_of(_DATA_PROPERTY)
+        for quad in quads:
+            s, p, value, datatype = quad
+            if p in valued and s > RESERVED and datatype in names:
+                name = names[datatype]
+                literal = Literal(lexical_form(value, name), name)
+                found.append(ax.DataPropertyAssertion(valued[p], names[s], literal))
+            else:
+                yield quad
+
+    def _numbers_of(self, kinds: frozenset[str]) -> dict[int, str]:
+        """Return the numbers and names of what is declared as this and nothing else."""
+        return {self._number(name): name for name, found in self._kinds.items() if found == kinds}
 
     def _fact(self, quad: Quad) -> Axiom | None:
         """Return the fact that a quad states by itself; None where it takes part in another axiom.
@@ -511,13 +564,13 @@ class WorldOntology:
             if predicate <= RESERVED or (value <= RESERVED and value not in self._label_of):
                 return None
             name = self._names.name(predicate)
-            if self._kinds.get(name) == {'object_property'}:
+            if self._kinds.get(name) == _OBJECT_PROPERTY:
                 return ax.ObjectPropertyAssertion(name, self._name(subject), self._name(value))
             return None
         if predicate <= RESERVED:
             return None
         name = self._names.name(predicate)
-        if self._kinds.get(name) == {'data_property'}:
+        if self._kinds.get(name) == _DATA_PROPERTY:
             return ax.DataPropertyAssertion(name, self._name(subject), self._literal(*quad[2:]))
         return None
 
@@ -707,7 +760,7 @@ class WorldOntology:
             if (places := self._places.pop(before, None)) is not None:
                 self._places[after] = places
         if old in self._kinds:
-            self._kinds.setdefault(new, set()).update(self._kinds.pop(old))
+            self._kinds[new] = self._kinds.pop(old) | self._kinds.get(new, frozenset())
         for kind, name in [entity for entity in self._declared if entity[1] == old]:
             self._declare_only((kind, name), remove=True)
             self._declare_only((kind, new))

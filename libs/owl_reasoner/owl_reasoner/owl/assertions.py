@@ -24,6 +24,9 @@ from owl_reasoner.owl.axioms import (
 from owl_reasoner.owl.entities import entities_of
 from owl_reasoner.owl.vocabulary import THING
 
+_PLAIN = (DataPropertyAssertion, ObjectPropertyAssertion)
+"""Most axioms of a large ontology; nothing but `axioms` and `about` says something of them."""
+
 
 class Unsettled(NamedTuple):
     """What changed since `Assertions.settle`, as it names it."""
@@ -38,6 +41,9 @@ class Unsettled(NamedTuple):
 class Assertions:
     """A set of axioms.
 
+    Args:
+        axioms: The first ones; they count as settled, except that nothing was made of `schema` yet.
+
     Attributes:
         axioms: All of them, oldest first, each with its number.
         about: The axioms that mention an entity, by their numbers.
@@ -49,7 +55,7 @@ class Assertions:
         schema_added, schema_removed: What changed since `settle` and is not about individuals.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, axioms: Iterable[Axiom] = ()) -> None:
         self.axioms: dict[Axiom, int] = {}
         self.about: dict[str, dict[int, Axiom]] = {}
         self.schema: dict[Axiom, None] = {}
@@ -61,6 +67,13 @@ class Assertions:
         self.schema_removed: dict[Axiom, None] = {}
         self._numbers = count(1)
         self._notes: dict[Axiom, dict[AxiomAnnotation, None]] = {}
+        for axiom in axioms:
+            if type(axiom) in _PLAIN:
+                self._enter(axiom)
+            else:
+                self.insert(axiom)
+        self.settle()
+        self.schema_changed = True
 
     def settle(self) -> tuple[tuple[Axiom, ...], tuple[Axiom, ...]]:
         """Take what was added and removed; from here on, nothing changed."""
@@ -99,16 +112,8 @@ class Assertions:
 
     def insert(self, axiom: Axiom) -> bool:
         """Assert an axiom; return False when it was asserted already."""
-        number = next(self._numbers)
-        if self.axioms.setdefault(axiom, number) != number:
+        if not self._enter(axiom):
             return False
-        about = self.about
-        for entity in _mentioned(axiom):
-            mentions = about.get(entity)
-            if mentions is None:
-                about[entity] = {number: axiom}
-            else:
-                mentions[number] = axiom
         if is_assertion(axiom):
             if self.removed and axiom in self.removed:
                 del self.removed[axiom]
@@ -126,6 +131,20 @@ class Assertions:
             self._notes.setdefault(axiom.axiom, {})[axiom] = None
         elif _is_schema(axiom):
             self.schema_changed = True
+        return True
+
+    def _enter(self, axiom: Axiom) -> bool:
+        """Take an axiom among all and to what it mentions; return False when it is there."""
+        number = next(self._numbers)
+        if self.axioms.setdefault(axiom, number) != number:
+            return False
+        about = self.about
+        for entity in _mentioned(axiom):
+            mentions = about.get(entity)
+            if mentions is None:
+                about[entity] = {number: axiom}
+            else:
+                mentions[number] = axiom
         return True
 
     def discard(self, axiom: Axiom) -> bool:
