@@ -33,6 +33,22 @@ def machine_of(state, userdata=None):
     return machine
 
 
+class Asleep(fsm.Interrupt):
+    """An interrupt that tells when a sleep has begun.
+
+    Attributes:
+        begun: The sleeper has fixed when it ends: from now on time may pass.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.begun = threading.Event()
+
+    def subscribe(self, callback):
+        self.begun.set()
+        return super().subscribe(callback)
+
+
 class SilentServer(PatrolNode):
     """A service that never answers."""
 

@@ -35,7 +35,7 @@ from state_machines.ros.calls import RoundTrips
 from surveillance_interfaces.action import FollowPath
 from surveillance_runtime.node import PatrolNode
 
-from .ros_servers import ScriptedActionServer, Stubborn, feed
+from .ros_servers import Asleep, ScriptedActionServer, Stubborn, feed
 
 
 def in_thread(work):
@@ -608,7 +608,9 @@ def test_clock_wait_follows_simulated_time(graph):
         clock.publish(message)
 
     graph.until(lambda: (tick(100), wait.now() == 100.0)[1])
-    end = in_thread(lambda: wait.sleep(50.0))
+    interrupt = Asleep()
+    end = in_thread(lambda: wait.sleep(50.0, interrupt))
+    assert interrupt.begun.wait(60.0)
     tick(149)
     graph.until(lambda: wait.now() == 149.0)
     tick(151)

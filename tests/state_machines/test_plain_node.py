@@ -31,7 +31,7 @@ from surveillance_interfaces.action import FollowPath
 from surveillance_interfaces.msg import FsmStatus, SmachContainerStatus, SmachContainerStructure
 from surveillance_runtime.introspection import IntrospectionClient, IntrospectionServer
 
-from .ros_servers import introspected
+from .ros_servers import Asleep, introspected
 
 LATCHED = QoSProfile(depth=200, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -175,11 +175,11 @@ def test_ros_time_that_jumps_back_does_not_delay_a_sleep(graph):
 
     at(1000)
     before = wait.elapsed()
-    ended = threading.Event()
-    interrupt = fsm.Interrupt()
+    ended, interrupt = threading.Event(), Asleep()
     sleeper = threading.Thread(target=lambda: wait.sleep(5.0, interrupt) and ended.set())
     sleeper.start()
     try:
+        assert interrupt.begun.wait(60.0)
         at(1002)
         at(900)
         assert not ended.is_set()
