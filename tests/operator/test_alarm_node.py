@@ -30,10 +30,10 @@ def phases(folder: Path) -> list[tuple[str, str]]:
 def test_a_person_is_called_also_for_what_began_before(graph: Any, tmp_path: Path) -> None:
     said = tmp_path / 'said'
     script = tmp_path / 'call.sh'
-    script.write_text(f'printf "%s\\n" "$@" >> {said}\n')
+    script.write_text(f'printf "%s\\n" "$@" >> "{said}"\n')
     robot = graph.add(partial(PatrolNode, 'robot_behavior'))
     robot.incidents.begin(DOOR, 'D1 is closed', Severity.ALARM)
-    parameters = {'command': f'sh {script}', 'folder': str(tmp_path)}
+    parameters = {'command': f"sh '{script}'", 'folder': str(tmp_path)}
     graph.add(Alarm, parameters=parameters)
     graph.until(lambda: said.exists() and said.read_text() == 'D1 is closed\n')
     robot.incidents.end(DOOR, 'it is open')
