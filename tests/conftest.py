@@ -106,7 +106,6 @@ def pytest_collection_finish() -> None:
 
     Most tests build a small world and drop it. The default interval costs some folders 6 %.
     """
-    gc.collect()
     gc.freeze()
     gc.set_threshold(10_000)
     gc.enable()

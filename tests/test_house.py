@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,6 @@ from benchmarks import structure
 
 CHECKOUT = Path(__file__).parents[1]
 MODULES = structure.product(CHECKOUT)
-TREES = {name: ast.parse(path.read_text(encoding='utf-8')) for name, path in MODULES.items()}
 LIBRARIES = {name for name, path in MODULES.items() if 'libs' in path.parts}
 
 DOUBLE_NAMES: dict[str, str] = {
@@ -150,6 +150,12 @@ WITHOUT_TESTS = CHECKOUT / 'tests' / 'modules_without_tests.txt'
 """Modules without a test file of their name, a line each: to be shortened."""
 
 
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Return the modules, parsed: once, and not where no rule is looked at."""
+    return {name: ast.parse(path.read_text(encoding='utf-8')) for name, path in MODULES.items()}
+
+
 def check(found: Iterable[str], table: Iterable[str], rule: str) -> None:
     """Compare what breaks a rule with its table of exceptions."""
     fresh, gone = sorted(set(found) - set(table)), sorted(set(table) - set(found))
@@ -158,39 +164,39 @@ def check(found: Iterable[str], table: Iterable[str], rule: str) -> None:
 
 
 def test_a_class_name_has_one_meaning() -> None:
-    doubles = structure.double_names(TREES)
+    doubles = structure.double_names(trees())
     check(doubles, DOUBLE_NAMES, 'a class of that name stands elsewhere; give it its own')
 
 
 def test_a_large_class_has_a_reason() -> None:
-    large = {name.rpartition('.')[2]: size for name, size in structure.owning_much(TREES).items()}
+    large = {name.rpartition('.')[2]: size for name, size in structure.owning_much(trees()).items()}
     limits = f'over {structure.MOST_ATTRIBUTES} attributes or {structure.MOST_LINES} lines'
     check(large, {*LARGE_CLASSES, *TO_BE_CUT}, f'{limits}: cut it by what it owns')
 
 
 def test_libraries_import_no_robot() -> None:
-    assert structure.upward(TREES, LIBRARIES, set(MODULES) - LIBRARIES) == []
+    assert structure.upward(trees(), LIBRARIES, set(MODULES) - LIBRARIES) == []
 
 
 def test_the_core_loads_no_ros() -> None:
     by_name = re.compile(r'(_node|conversions|topics)$|\.(ros|ros_adapters|feeds)\.')
-    found = {name for name in structure.loading_ros(TREES) if not by_name.search(name)}
+    found = {name for name in structure.loading_ros(trees()) if not by_name.search(name)}
     check(found, KNOWING_ROS, 'loads ROS: hand it plain values, or say in the table why not')
 
 
 def test_no_library_loads_ros_but_for_its_part_for_ros() -> None:
-    found = structure.loading_ros(TREES) & LIBRARIES
+    found = structure.loading_ros(trees()) & LIBRARIES
     assert {name for name in found if not name.startswith('state_machines.ros.')} == set()
 
 
 def test_a_library_is_used_by_its_face() -> None:
     rule = 'is not public: import the name from the library, or name the module in its __init__'
-    check(structure.past_the_face(TREES, MODULES), PAST_THE_FACE, rule)
+    check(structure.past_the_face(trees(), MODULES), PAST_THE_FACE, rule)
 
 
 @pytest.mark.parametrize('library', sorted({name.split('.')[0] for name in LIBRARIES}))
 def test_what_a_library_calls_public_is_there(library: str) -> None:
-    for name in structure.public_modules(TREES[f'{library}.__init__']):
+    for name in structure.public_modules(trees()[f'{library}.__init__']):
         inner = f'{library}.{name}'
         assert {inner, f'{inner}.__init__'} & set(MODULES), f'{library}.__init__ names {name}'
 
