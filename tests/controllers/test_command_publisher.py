@@ -215,7 +215,8 @@ def test_a_scan_that_is_late_where_nothing_is_ahead_slows_the_robot_down_by_its_
     bases = Bases(graph, monkeypatch, 1, LONGEST_SILENCE)
     for count in range(30):
         bases.see(0.1 * count)
-    assert bases.blind_until(2.9 + 0.1 + 0.25)[-1] > 0.3, 'it drives on'
+    assert bases.blind_until(2.9 + 0.1 + 0.25)[-1] == 0.5, 'it drives on'
+    assert 0.1 < bases.blind_until(2.9 + 0.1 + 0.6)[-1] < 0.4
     speeds = bases.blind_until(2.9 + 0.1 + LONGEST_SILENCE)
     assert speeds == sorted(speeds, reverse=True)
     assert speeds[-1] == 0.0

@@ -5,9 +5,9 @@ again, slower each time, until the robot stands: a robot that sees nothing stand
 
 From speed v the base stands after v / a seconds. Messages that come on time, or a little late,
 leave the speed as it is: it falls from the moment at which the base must brake so that it stands
-`STANDSTILL` seconds after the first message that did not come. How steeply it falls depends on what
-was seen: where nothing was ahead, the robot may take up to `longest_silence` seconds until it
-stands (`blind_time`). The period of the messages is what they themselves show.
+`STANDSTILL` seconds after the first message that did not come. Where nothing was seen ahead, the
+robot may take longer, up to `longest_silence` (`blind_time`): its speed falls later, and by the age
+of what it saw. The period of the messages is what they themselves show.
 """
 
 from __future__ import annotations
@@ -133,10 +133,11 @@ class SensorAge:
         Args:
             speed: The wanted one, m/s.
             now: Seconds.
-            more: The robot may take so much longer until it stands, seconds.
+            more: The robot may take so much longer until it stands, seconds: for half of that it
+                drives on, in the other half it slows down.
         """
         left = self.left(now)[0] - REACTION + more
-        braking = abs(speed) / self._deceleration + more
+        braking = abs(speed) / self._deceleration + more / 2
         if left <= 0.0:
             return 0.0
         return 1.0 if left >= braking else left / braking
