@@ -138,17 +138,20 @@ class Side:
         return picture
 
     def set_pose_when_up(self) -> None:
-        """Say where the robot is; a goal in the first seconds after that is aborted.
+        """Say where the robot is as soon as AMCL listens; a goal in the first seconds after that
+        is aborted.
 
         On a busy machine Nav2's lifecycle manager gives up while it starts: it is started again.
         """
         assert self.stack is not None
         for _ in range(3):
-            if self.wait_for(self.stack.is_active, 40.0) is not None:
-                break
+            if self.wait_for(self.stack.localizes, 40.0) is not None:
+                # The planner's costmap waits for the pose while it is activated.
+                self.set_pose()
+                if self.wait_for(self.stack.is_active, 60.0) is not None:
+                    break
             self.stack.stop()
             self.stack.start()
-        self.set_pose()
         time.sleep(4.0)
 
     def start_patrol(self) -> None:

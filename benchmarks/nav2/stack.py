@@ -167,14 +167,17 @@ class Nav2Stack:
             node = f'lifecycle_manager_{name}'
             self.start_one('nav2_lifecycle_manager', 'lifecycle_manager', node)
 
+    def localizes(self) -> bool:
+        """Tell whether map server and AMCL are active."""
+        return self._is_up(MANAGED[0])
+
     def is_active(self) -> bool:
         """Tell whether both managers have brought up all that was started last."""
-        return all(
-            (self._folder / f'lifecycle_manager_{name}.log')
-            .read_text('utf-8', 'replace')
-            .count('Managed nodes are active')
-            for name in MANAGED
-        )
+        return all(map(self._is_up, MANAGED))
+
+    def _is_up(self, manager: str) -> bool:
+        log = self._folder / f'lifecycle_manager_{manager}.log'
+        return 'Managed nodes are active' in log.read_text('utf-8', 'replace')
 
     def start_one(self, package: str, program: str, node: str) -> None:
         """Start one server."""
