@@ -48,6 +48,15 @@ BANNED = {
 """What a reader does not search for, or what says nothing, with what to write."""
 
 
+PASSIVE = re.compile(
+    r'\b(?:is|are|was|were|be|been|being)\s+'
+    r'(?:(?:not|never|also|only|then|still|often|always|first|already|once|so|at once)\s+)*'
+    r'(?:\w+ed|known|seen|found|made|given|taken|kept|held|built|sent|read|written|driven|drawn'
+    r'|shown|told|said|left|lost|cut|set|put|run|begun|done|met|heard|shut|bound|caught)\b',
+    re.IGNORECASE,
+)
+"""A form of "be" with a participle: a passive, mostly; "is closed" of a door counts as well."""
+
 ITEM = re.compile(r'^\s*([-*]|\d+\.)\s+')
 """How an item of a list begins."""
 
@@ -76,8 +85,13 @@ class Page:
         return sum(self.sentences) / max(1, len(self.sentences))
 
     @property
+    def passive(self) -> float:
+        """Return which part of the sentences has a passive."""
+        return sum(bool(PASSIVE.search(each)) for each in self.text) / max(1, len(self.text))
+
+    @property
     def long(self) -> float:
-        """Return the share of long sentences."""
+        """Return which part of the sentences is long."""
         return sum(each > LONG for each in self.sentences) / max(1, len(self.sentences))
 
 
@@ -128,17 +142,20 @@ def main() -> int:
     """Print the figures."""
     checkout = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else CHECKOUT
     found = pages(checkout)
-    print(f'{"page":44} words  marks/1,000  sentence  over {LONG}')
+    print(f'{"page":44} words  marks/1,000  sentence  over {LONG}  passive')
     every = Page(
         'all',
         sum(page.words for page in found),
         sum(page.marks for page in found),
         tuple(each for page in found for each in page.sentences),
-        (),
+        tuple(each for page in found for each in page.text),
     )
     for page in [*found, every]:
         marks = 1000 * page.marks / max(1, page.words)
-        print(f'{page.name:44} {page.words:5}  {marks:11.1f}  {page.mean:8.1f}  {page.long:6.1%}')
+        print(
+            f'{page.name:44} {page.words:5}  {marks:11.1f}  {page.mean:8.1f}  {page.long:6.1%}'
+            f'  {page.passive:6.1%}'
+        )
     return 0
 
 

@@ -69,11 +69,18 @@ def test_words_are_the_fields(page: Any) -> None:
     assert not found
 
 
+def test_most_sentences_are_active() -> None:
+    every = [each for page in PAGES for each in page.text]
+    assert sum(bool(words.PASSIVE.search(each)) for each in every) < 0.12 * len(every)
+    passive = {page.name: page.passive for page in PAGES if len(page.text) >= 10}
+    assert not {name: part for name, part in passive.items() if part > 0.25}
+
+
 def test_the_whole_is_short_and_has_code() -> None:
     read = [page for page in PAGES if not page.name.endswith('measurements.md')]
     total = sum(page.words for page in read)
     assert total <= 29_500
-    assert 1000 * sum(page.marks for page in read) / total >= 18
+    assert 1000 * sum(page.marks for page in read) / total >= 20
 
 
 @pytest.mark.parametrize('path', [p for p in DONE if 'how-to' in p.parts], ids=lambda p: p.stem)
