@@ -25,7 +25,6 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
 from rclpy.serialization import deserialize_message
 
 from surveillance_runtime.diagnostics import PERIOD, TOPIC
@@ -178,7 +177,7 @@ class DuplicateNodeWatch:
         self._duplicates = DuplicateNodes(self._own)
         self._told: set[str] = set()
         _Ears(node, self._duplicates)
-        node.create_timer(PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.every(PERIOD, self._look)
 
     def _look(self) -> None:
         found = self._duplicates.launches(time.monotonic())

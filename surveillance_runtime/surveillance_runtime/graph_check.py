@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from nav_msgs.msg import Odometry
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
@@ -273,8 +272,7 @@ class InputWatch:
         self._now = now
         self._silent = {each.topic: 0.0 for each in wanted}
         self._looked_at = math.inf
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK_PERIOD, self._look, clock=steady)
+        node.every(LOOK_PERIOD, self._look)
 
     def _look(self) -> None:
         now, missing = self._now(), set(self._missing())

@@ -95,10 +95,9 @@ class OwnedTopic(Generic[M]):
         self._owes_answer = False
         self._told = ''
         node.create_subscription(kind, name, self._on_heard, STATE_QOS, raw=True)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._repeats = repeat is not None
         self._said_at = 0.0
-        node.create_timer(repeat or REPEAT, self._on_period, clock=steady)
+        node.every(repeat or REPEAT, self._on_period)
 
     def publish(self, message: M) -> None:
         """Publish a state."""

@@ -172,3 +172,14 @@ def test_the_first_of_two_other_programs_is_believed_and_the_second_named(graph:
     graph.drop(stranger)
     graph.until(lambda: ('topic', 'map') not in node.incidents.open())
     assert [each.data for each in maps] == [1, 2]
+
+
+def test_the_states_of_a_node_are_repeated_by_one_timer(graph: Any) -> None:
+    owner = graph.add(PatrolNode, name='owner')
+    before = len(list(owner.timers))
+    heard = []
+    for name in ('level', 'other'):
+        OwnedTopic(owner, UInt8, name, repeat=0.05).publish(UInt8(data=5))
+        heard.append(graph.listen(UInt8, name, STATE_QOS))
+    assert len(list(owner.timers)) == before + 1
+    graph.until(lambda: all(len(each) >= 3 for each in heard))

@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from rclpy.clock import Clock, ClockType
-
 from surveillance_runtime.alarms import SILENT_AFTER
 from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.incidents import Incidents, Severity
@@ -105,9 +103,8 @@ class SensorWatch:
         self._silence = SilenceWatch(node.incidents, streams.values())
         self._node, self._profile = node, replace(RobotProfile(), topics=topics, frames=frames)
         self._streams, self._child = streams, child
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK_PERIOD, lambda: self._silence.look(time.monotonic()), clock=steady)
-        node.create_timer(DOUBT_PERIOD, self._doubt, clock=steady)
+        node.every(LOOK_PERIOD, lambda: self._silence.look(time.monotonic()))
+        node.every(DOUBT_PERIOD, self._doubt)
 
     def _doubt(self) -> None:
         """Doubt what comes, as `doctor` does; `StateSubscription` tells of a second publisher."""
