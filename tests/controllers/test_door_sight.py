@@ -115,6 +115,27 @@ def test_a_door_that_stays_shut_is_looked_at_less_and_less() -> None:
     assert looking.sight.shut == frozenset()
 
 
+def test_a_robot_that_can_do_nothing_else_looks_sooner_whether_a_door_is_open_again() -> None:
+    looking = Looking()
+    away = 6.9, 2.9, 0.0
+    looking.look((2.0, 1.5, 0.3), closed=True)
+    looking.now += 100.0
+    looking.look((2.0, 1.5, 0.3), closed=True)
+    looking.now += COUNTS_FOR[0] + 1.0
+    looking.look(away, closed=True, times=1)
+    assert looking.sight.shut == {'D'}
+
+    looking.sight.nothing_else = True
+    looking.look(away, closed=True, times=1)
+    assert looking.sight.shut == frozenset()
+    looking.sight.nothing_else = False
+    looking.look(away, closed=True, times=1)
+    assert looking.sight.shut == frozenset(), 'it is on its way there'
+
+    looking.look((2.0, 1.5, 0.3), closed=True)
+    assert looking.sight.shut == {'D'}, 'it is seen shut, whatever the robot would like'
+
+
 def test_a_door_that_was_taken_from_the_place_is_no_longer_shut() -> None:
     looking = Looking()
     looking.look((2.0, 1.5, 0.3), closed=True)

@@ -4,6 +4,7 @@ Each scan is read door by door (`indoor_watch.doors`). Most of the last readings
 door is shut, or open again: people stand in doorways. A door that nobody looks at may be open
 again, and the robot has to go there to see it. So it counts as shut for as long again as it is
 known to have been shut: one that has just been shut is looked at soon, one that stays shut seldom.
+Where nothing else can be reached, each one is looked at as soon as one that has just been shut.
 """
 
 from __future__ import annotations
@@ -53,11 +54,16 @@ class DoorSight:
 
     Args:
         doors: Their openings by name, map frame, metres.
+
+    Attributes:
+        nothing_else: Nothing else can be reached: what was not seen shut for the least time may be
+            open, so that the robot goes there and looks.
     """
 
     def __init__(self, doors: Mapping[str, Segment]) -> None:
         self._doors = {name: _SeenDoor(segment) for name, segment in doors.items()}
         self._read_at = -math.inf
+        self.nothing_else = False
         self._shut: frozenset[str] = frozenset()
 
     @property
@@ -102,6 +108,9 @@ class DoorSight:
             x1, y1, x2, y2 = door.segment
             if math.dist(((x1 + x2) / 2, (y1 + y2) / 2), lidar[:2]) <= READ_WITHIN:
                 self._read(door, lidar, ends, now)
+            if self.nothing_else and now - door.shut_at > COUNTS_FOR[0]:
+                # For good: on the way there the robot no longer waits for help.
+                door.shut_since = None
         before, self._shut = (
             self._shut,
             frozenset(name for name, door in self._doors.items() if door.is_shut(now)),

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from floor_plans.shapes import Segment
 from lidar_navigation.geometry import Pose, Scan
 from surveillance_controllers.motion.door_sight import DoorSight
-from surveillance_interfaces.msg import DoorStates
+from surveillance_interfaces.msg import DoorStates, MissionStatus
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import OwnedTopic
 
@@ -40,6 +40,10 @@ class DoorTeller:
     def take_doors(self, doors: Mapping[str, Segment]) -> None:
         """Take where the doors are now."""
         self._sight.take_doors(doors)
+
+    def take_mission(self, message: MissionStatus) -> None:
+        """Take whether nothing that the robot tried worked."""
+        self._sight.nothing_else = message.waiting_for_help
 
     def see(self, pose: Pose, scan: Scan, now: float) -> None:
         """Take a scan made at a pose that is to be trusted, see `DoorSight.see`."""

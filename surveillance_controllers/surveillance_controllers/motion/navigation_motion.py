@@ -237,6 +237,7 @@ class NavigationMotion:
         """Take that a mission goes on: then a robot that does not know where it is finds out."""
         with self._goals.lock:
             self._navigator.seeks = 'RECHARG' not in message.state.upper()
+        self._doors.take_mission(message)
 
     def _on_hold(self) -> None:
         with self._goals.lock:
