@@ -321,3 +321,20 @@ def test_a_rival_that_is_as_likely_as_the_pose_is_not_followed() -> None:
     belief.add([(CLOSE, 0.0), (FAR, 0.0)])
     assert not belief.follow_best(0.0)
     assert belief.pose == HERE
+
+
+@pytest.mark.parametrize(
+    ('here', 'there', 'odds', 'pose'),
+    [(0.93, 0.95, 0.3, FAR), (0.6, 0.62, 1.0, HERE), (0.6, 0.62, 3.1, FAR)],
+    ids=['as usual', 'among people', 'among people, beyond doubt'],
+)
+def test_an_unsure_robot_goes_on_from_the_likeliest_pose_unless_people_hide_what_tells(
+    here: float, there: float, odds: float, pose: Pose
+) -> None:
+    localiser = Told()
+    localiser._shaken = True
+    localiser._belief.rivals = [Rival(FAR, odds)]
+    localiser.worth = lambda pose: {HERE: here, FAR: there}.get(pose, 0.0)
+    localiser.see(SCAN, 0.0)
+    assert localiser.pose == pose
+    assert localiser.ambiguous

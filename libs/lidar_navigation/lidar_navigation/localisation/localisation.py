@@ -24,7 +24,7 @@ import numpy as np
 
 from floor_plans import Grid
 from lidar_navigation.geometry import Pose, Scan, angle_between, composed
-from lidar_navigation.localisation.belief import CHANCE, SURE, Belief, told
+from lidar_navigation.localisation.belief import SURE, Belief, told
 from lidar_navigation.localisation.odometry import ContinuousOdometry
 from lidar_navigation.localisation.pose_search import found_poses
 from lidar_navigation.localisation.scan_fit import Evidence, ScanFit
@@ -263,7 +263,11 @@ class Localiser:
         there = self._fit.evidence(likeliest, thin.thinned(self.parameters.cast_rays))
         if there.log_likelihood < evidence.log_likelihood:
             return evidence
-        if not self._belief.follow_best(CHANCE if self._shaken else SURE):
+        # A robot that is unsure goes on from the likeliest pose, unless that explains less than is
+        # usual here: then people all around say little of where it is.
+        usual = self._usual - self.parameters.doubt_drop / 2
+        is_plain = self._shaken and there.fit >= usual
+        if not self._belief.follow_best(0.0 if is_plain else SURE):
             return evidence
         self.jumps += 1
         return there
