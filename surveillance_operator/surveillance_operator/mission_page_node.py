@@ -266,6 +266,7 @@ class MissionPage(PatrolNode):
             'explain': lambda fact: {'ok': True, 'lines': actions.shared.explain(fact)},
             'why_not': why_not,
             'sightings': self._sightings.listed,
+            'baseline': self._sightings.baseline,
             **({} if self._desk is None else self._desk.questions()),
             **({} if self._past is None else {'past': self._past.past}),
         }

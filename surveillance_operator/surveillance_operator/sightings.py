@@ -16,6 +16,7 @@ from surveillance_runtime.state_topics import StateSubscription
 
 MOST_EVENTS = 2000
 """A message with more is not read."""
+_WAITING = ('open', 'acknowledged')
 _ANSWERED = ('normal', 'acknowledged', 'false alarm')
 
 
@@ -54,6 +55,13 @@ class Sightings:
             'answered': answered,
             'false': false,
         }
+
+    def baseline(self, robot: str = '') -> dict[str, Any]:
+        """Return what the first look found and the map does not show, and nobody has accepted."""
+        with self._lock:
+            events = [each for each in self._events.get(robot, ()) if each['seen'] == 'unmapped']
+        waiting = [each for each in events if each['state'] in _WAITING]
+        return {'ok': True, 'events': sorted(waiting, key=lambda each: each['number'])}
 
     def picture(self, name: str, robot: str, run: str = '', *, blur: bool) -> bytes | None:
         """Return one of the observer's pictures as JPEG; None where there is none of that name.

@@ -6,6 +6,8 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 
 from surveillance_operator.page.access import Links
@@ -25,6 +27,9 @@ ALERT = {
 }  # fmt: skip
 
 
+SHOWN = cv2.imencode('.jpg', np.full((60, 120, 3), 90, np.uint8))[1].tobytes()
+
+
 class Desk:
     """The page with control, and what was pressed on it."""
 
@@ -33,6 +38,7 @@ class Desk:
         self.links = Links()
         self.driven: list[tuple[float, float]] = []
         self.asked: list[dict[str, Any]] = []
+        self.baseline: list[dict[str, Any]] = []
         self.broadcaster = Broadcaster()
         self.page = Page(
             self.broadcaster,
@@ -40,6 +46,7 @@ class Desk:
                 'search': self._search,
                 'event': lambda key: {'ok': True, 'event': ALERT},
                 'place': lambda: {'ok': True},
+                'baseline': lambda: {'ok': True, 'events': self.baseline},
                 'choices': lambda: {
                     'ok': True,
                     'places': ['R3'],
@@ -57,8 +64,10 @@ class Desk:
                 'drive': self._drive,
                 'stop': lambda on, **_: self._press(f'stop {on}'),
                 'machine': lambda word, **_: self._press(word),
+                'event': self._event,
                 'remove_room': lambda name: self._press(f'remove {name}'),
             },
+            evidence=lambda name, *_: SHOWN if name in ('a.jpg', 'b.jpg') else None,
             port=0,
             links=self.links,
         )
@@ -76,6 +85,15 @@ class Desk:
     def _alarm(self, verb: str, key: str, note: str = '', more: str = '', by: str = '') -> str:
         words = (verb, key, more, by, note)
         return self._press(' '.join(each for each in words if each))
+
+    def _event(self, line: str) -> str:
+        for each in list(self.baseline):
+            of_all = line == 'normal baseline' and each['state'] == 'open'
+            if of_all or line == f'normal {each["number"]}':
+                self.baseline.remove(each)
+            elif line == f'acknowledge {each["number"]}':
+                each['state'] = 'acknowledged'
+        return self._press(line)
 
     def _drive(self, speed: float, turn: float) -> str:
         self.driven.append((float(speed), float(turn)))
@@ -98,6 +116,34 @@ def desk() -> Iterator[Desk]:
     yield desk
     desk.viewer.close()
     desk.page.stop()
+
+
+def test_what_the_first_look_found_is_shown_and_a_person_accepts_or_refuses_it(desk: Desk) -> None:
+    viewer = desk.viewer
+    desk.done.clear()
+    viewer.js('location.hash = "#/engineer"')
+    viewer.js('location.hash = "#/desk"')
+    assert not viewer.js('return document.getElementById("baseline-section").checkVisibility()')
+    thing = {'place': 'C1', 'position': [3.0, 1.5], 'state': 'open'}
+    desk.baseline = [
+        {**thing, 'number': number, 'evidence': [shown]}
+        for number, shown in ((3, 'a.jpg'), (4, 'b.jpg'), (5, 'gone.jpg'), (6, 'a.jpg'))
+    ]
+    viewer.js('location.hash = "#/engineer"')
+    viewer.js('location.hash = "#/desk"')
+    viewer.until(lambda: viewer.count('#baseline > li') == 4)
+    assert '3: a thing in C1 at 3.0, 1.5' in viewer.text('#baseline')
+    # A picture each; of the third it is no longer there.
+    viewer.until(lambda: viewer.count('#baseline img') == 3)
+    viewer.click('#baseline [data-baseline=normal]')
+    viewer.until(lambda: viewer.count('#baseline > li') == 3)
+    assert viewer.text('#baseline-said') == '✓ normal 3'
+    viewer.click('#baseline [data-baseline=acknowledge]')
+    viewer.until(lambda: 'refused' in viewer.text('#baseline > li'))
+    viewer.click('#baseline-all')
+    viewer.until(lambda: viewer.count('#baseline > li') == 1)
+    assert desk.done == ['normal 3', 'acknowledge 4', 'normal baseline']
+    assert viewer.js('return document.getElementById("baseline-all").hidden')
 
 
 def press(desk: Desk, key: str, selector: str = 'body') -> None:

@@ -119,6 +119,8 @@ class Alerting:
             drawn = self._drawn(seen.position, visit)
             if drawn is not None:
                 (picture, before), kind = drawn, SWEEP
+                # What the first look shows is normal already: the map alone is what it is beside.
+                before = None if seen.state == 'unmapped' else before
         if picture is None:
             return ''
         if self._blur is not None and not is_sharp and not kind:
@@ -152,7 +154,7 @@ class Alerting:
             self.book.end(number, stamp)
 
     def accept(self, stamp: float) -> None:
-        """Take as normal what goes on for so long as its rule says.
+        """Take as normal what goes on for so long as its rule says, and nobody has answered.
 
         Args:
             stamp: Now, seconds since 1970.
@@ -160,7 +162,7 @@ class Alerting:
         for event in self.book.current:
             rule = self._by_words.get(event.rule)
             is_due = rule is not None and stamp - event.began >= rule.accepted
-            if is_due and event.state in (EventState.OPEN, EventState.ACKNOWLEDGED):
+            if is_due and event.state == EventState.OPEN:
                 self.book.answer(event.number, EventState.NORMAL)
 
     def doubts(self, stamp: float) -> list[Event]:

@@ -2,7 +2,8 @@
 
 `acknowledge 3`, `normal 3`, `false 3`, `events`; `baseline` lists what the map does not show and
 nobody has accepted, `normal baseline` accepts all of it; `movable` lists what moves often, `movable
-undo 2` has it told again.
+undo 2` has it told again. What of the baseline a person acknowledges is refused: neither time nor
+`normal baseline` accepts it.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def answered(
         listed = '; '.join([*lines, *([f'and {more} more'] if more else [])])
         return listed or 'all that stands there is on the map, or accepted'
     if words == ['normal', 'baseline']:
-        found = _baseline(book)
+        found = [each for each in _baseline(book) if each.state == EventState.OPEN]
         for each in found:
             (answer or book.answer)(each.number, EventState.NORMAL)
         return f'{len(found)} things are normal from now on'

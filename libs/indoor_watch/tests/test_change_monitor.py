@@ -1090,7 +1090,7 @@ def test_who_stands_beyond_an_open_door_is_in_the_room_there_and_where_the_lidar
     assert event.position == pytest.approx((7.45, 2.5), abs=0.1)
 
 
-def baseline_round(accepted: str = 'by a person') -> Round:
+def baseline_round(accepted: str = 'by a person', store: EvidenceStore | None = None) -> Round:
     watch = Round()
     rules = [
         *yaml.safe_load(RULES),
@@ -1104,6 +1104,7 @@ def baseline_round(accepted: str = 'by a person') -> Round:
         rooms=Halves(),
         doors={'D1': DOOR},
         alert=lambda event: watch.alerts.append(event.number),
+        store=store,
     )
     watch.watcher.use_map(room())
     return watch
@@ -1150,6 +1151,37 @@ def test_time_accepts_the_baseline_where_the_rule_says_so_and_nothing_else() -> 
     watch.visit('R1', HERE, boxes=PARCELS[:2])
     states = {each.seen: each.state for each in watch.book.events}
     assert states == {'unmapped': EventState.NORMAL, 'appeared': EventState.OPEN}
+
+
+def test_what_the_first_look_shows_has_a_picture_of_it_on_the_map_alone(tmp_path: Path) -> None:
+    store = EvidenceStore(tmp_path)
+    watch = baseline_round(store=store)
+    watch.visit('R1', HERE, boxes=PARCELS[:1])
+    watch.visit('R1', HERE, boxes=PARCELS[:2])
+    shapes = {}
+    for event in watch.book.events:
+        picture = cv2.imread(str(tmp_path / event.evidence[0]))
+        assert picture is not None
+        shapes[event.seen] = picture.shape[1] / picture.shape[0]
+    # The other thing is shown before and now, side by side.
+    assert shapes['unmapped'] == pytest.approx(1.0)
+    assert shapes['appeared'] > 1.9
+
+
+def test_what_a_person_refused_of_the_baseline_neither_time_nor_all_accepts() -> None:
+    watch = baseline_round('after 2 days')
+    watch.visit('R1', HERE, boxes=PARCELS)
+    refused = min(each.number for each in watch.book.events)
+    answered(watch.book, f'acknowledge {refused}', watch.watcher.answer)
+    assert answered(watch.book, 'normal baseline', watch.watcher.answer).startswith('2 things')
+    watch.time += 3 * 86_400.0
+    watch.visit('R1', HERE, boxes=PARCELS)
+    assert answered(watch.book, 'baseline').startswith(f'{refused}: ')
+    for _ in range(2):
+        watch.visit('R1', HERE)
+    event = watch.book.find(refused)
+    assert event is not None
+    assert event.state == EventState.OVER, 'it was taken away'
 
 
 def test_a_parcel_of_the_first_look_that_is_gone_leaves_the_baseline() -> None:

@@ -20,6 +20,12 @@ export function pictures(event) {
     h('figcaption', {class: 'note'}, names.length > 1 ? (number ? 'last sighting' : 'first sighting') : 'sighting'))));
 }
 
+// What came of a press.
+export function told(id, found) {
+  $(id).textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
+  $(id).className = found.ok ? 'ok' : 'warn';
+}
+
 // A film of ten seconds around an event, made when somebody asks for it.
 export function film(event) {
   const box = h('div');
@@ -161,8 +167,7 @@ export class Alarms {
   }
 
   told(found) {
-    $('alarm-said').textContent = (found.ok ? '✓ ' : '✗ ') + found.text;
-    $('alarm-said').className = found.ok ? 'ok' : 'warn';
+    told('alarm-said', found);
   }
 
   choose(key, stay = false) {

@@ -52,7 +52,7 @@ export const figuresOf = ({figures, battery}) => figures ?? (battery ? [['batter
 
 // The robot that is looked at; one that is alone has no name.
 export const shown = {robot: ''};
-const OF_ROBOT = new Set(['go', 'arm', 'machine', 'stop', 'threshold', 'policy', 'command', 'event', 'why_not', 'sightings']);
+const OF_ROBOT = new Set(['go', 'arm', 'machine', 'stop', 'threshold', 'policy', 'command', 'event', 'why_not', 'sightings', 'baseline']);
 const whose = (name, fields) => (shown.robot && OF_ROBOT.has(name) ? {robot: shown.robot, ...fields} : fields);
 
 // The colour of a robot of a fleet, by its place in the order of their names.

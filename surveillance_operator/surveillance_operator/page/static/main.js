@@ -9,6 +9,7 @@ import {Control} from './control.js';
 import {Fleet} from './fleet.js';
 import {Replay} from './replay.js';
 import {Alarms} from './alarms.js';
+import {Baseline} from './baseline.js';
 import {Search} from './search.js';
 import {Shift} from './shift.js';
 import {Drive} from './drive.js';
@@ -40,6 +41,7 @@ const map = new MapView($('map'), (place) => { why.choose(place); control.choose
 const replay = replaying ? new Replay() : null;
 const alarms = new Alarms({may: guard && !replaying, wall, onChoose: (event) => map.lookAt(event.position)});
 const search = new Search({may: guard && !replaying, operator: may && !replaying, wall, jump: replaying ? (at) => { replay.jump(at); open('desk'); } : null});
+if (!replaying) new Baseline({may: guard});
 map.addLayer('events', alarms.spots);
 const fleet = new Fleet(robots, may && !replaying, look);
 let asked = new URLSearchParams(location.search).get('robot');
