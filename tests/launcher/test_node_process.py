@@ -31,7 +31,8 @@ def test_children_end_with_a_launcher_that_is_killed(start):
 def test_a_child_whose_launcher_is_gone_already_does_not_start():
     child = str(ROOT / 'launcher' / 'node_process.py')
     done = subprocess.run(
-        [sys.executable, '-P', child, '1', 'x=tests.launcher.waiting_node:X'],
+        # No process has this number: 1 is the parent of whatever a container begins with.
+        [sys.executable, '-P', child, str(2**22 + 1), 'x=tests.launcher.waiting_node:X'],
         env=USER_ENVIRON,
         timeout=60.0,
         check=False,

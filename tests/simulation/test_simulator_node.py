@@ -78,7 +78,9 @@ def test_it_publishes_map_doors_clock_and_odometry(graph: Any) -> None:
     assert grid.cells[tuple(grid.cells_of(np.array((1.0, 1.0)))[0])] == 0
     assert list(doors[0].open) == ['D']
     times = [clock.clock.sec + clock.clock.nanosec / 1e9 for clock in clocks]
-    assert np.diff(times) == pytest.approx(0.1)
+    steps = np.diff(times) / 0.1  # the last one alone is kept: on a busy machine some are lost
+    assert min(steps) > 0.5
+    assert steps == pytest.approx(np.round(steps))
     assert pose_from(odometry[0].pose.pose) == (1.0, 1.0, 0.0)
 
 
