@@ -57,7 +57,8 @@ class WorldNames:
     def read_all(self, renamed: Iterable[tuple[int, str]] = ()) -> None:
         """Ask for all names at once; know some by the names that they had before."""
         self.names.update(self._db.execute('SELECT storid, iri FROM resources'))
-        self.names.update(renamed)
+        # Of several the first: that is how it was.
+        self.names.update(reversed([*renamed]))
         self._numbers = {name: number for number, name in self.names.items()}
 
     def number(self, name: str) -> int:
