@@ -412,7 +412,7 @@ class CollisionMonitor(PatrolNode):
         kind = self._base.type_name
         types = {
             info.topic_type.replace('/msg/', '/')
-            for info in self.get_subscriptions_info_by_topic(self._base.topic)
+            for info in self.get_subscriptions_info_by_topic(COMMAND)
         }
         if types == {kind} or (not types and self._wanted == Velocity()):
             self.incidents.end(BASE_CAUSE, 'the base listens')

@@ -40,14 +40,13 @@ from surveillance_runtime.launch_protocol import NotNowError
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.process import run_node
 from surveillance_runtime.run_files import RECORDING, TIMELINE
+from surveillance_runtime.topic_names import asked_as
 
 DRAIN_PERIOD, SEAL_PERIOD, STATE_PERIOD = 0.15, 0.6, 0.4
 """Seconds between two looks at all queues, two chunks, and two lines of the time line."""
 PRUNE_PERIOD = 60.0
 RETRY_PERIOD = 3.0
 """Seconds after which a recording that could not be written is tried again."""
-BASE_COMMAND = 'cmd_vel_monitored'
-"""What the base hears, before a run's remappings."""
 STREAMS = frozenset(
     (
         *(f'geometry_msgs/msg/{name}' for name in ('Twist', 'TwistStamped')),
@@ -189,22 +188,13 @@ class MissionRecorder(PatrolNode):
                 continue
             offers = [
                 each
-                for each in self.get_publishers_info_by_topic(topic)
+                for each in self.get_publishers_info_by_topic(asked_as(self, topic))
                 if each.node_name != self.get_name()
             ]
             if offers:
                 # Of two types that of this project, which this process hears in any case.
                 kind = next((each for each in types if each.startswith(OWN)), types[0])
                 self._follow(topic, kind, offers)
-
-    def _name_of(self, topic: str) -> str:
-        """Return by which name this node subscribes to a topic: the run's remappings count for it,
-        too, and `cmd_vel` of a robot may be the name of what the base hears.
-        """
-        for name in (topic, BASE_COMMAND):
-            if self.resolve_topic_name(name) == topic:
-                return name
-        return topic
 
     def _look_for_clashes(self, topics: Sequence[str]) -> None:
         """Tell of topics that have more than one type, and of those that have not any more."""
@@ -237,8 +227,9 @@ class MissionRecorder(PatrolNode):
             self._bag.add_topic(
                 TopicType(topic, kind, definition(kind), reliable, latched, depth, type_hash)
             )
-            name = self._name_of(topic)
-            subscription = PolledSubscription(self, message_class(kind), name, qos, raw=True)
+            subscription = PolledSubscription(
+                self, message_class(kind), asked_as(self, topic), qos, raw=True
+            )
         except (ValueError, ImportError, AttributeError, _rclpy.RCLError) as error:
             # A type that is not installed here, or a second one on a topic: the middleware refuses
             # that to a process that has the other already.

@@ -32,6 +32,7 @@ from surveillance_runtime.profile.check_up import (
 from surveillance_runtime.qos import SENSOR_QOS
 from surveillance_runtime.sensing.conversions import matrix_from
 from surveillance_runtime.sensing.frame_tree import FrameLink, FrameTree, plain
+from surveillance_runtime.topic_names import asked_as
 
 try:
     from tf2_msgs.msg import TFMessage
@@ -51,9 +52,10 @@ def endpoints_of(node: Node, topics: Iterable[str] | None = None) -> GraphSample
     if topics is None:
         topics = [topic for topic, _ in node.get_topic_names_and_types()]
     for topic in topics:
+        name = asked_as(node, topic)
         for found, infos in (
-            (publishers, node.get_publishers_info_by_topic(topic)),
-            (subscribers, node.get_subscriptions_info_by_topic(topic)),
+            (publishers, node.get_publishers_info_by_topic(name)),
+            (subscribers, node.get_subscriptions_info_by_topic(name)),
         ):
             ends = [_endpoint(info) for info in infos if info.node_name != node.get_name()]
             if ends:

@@ -27,6 +27,7 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import RUN_NODES
 from surveillance_runtime.publisher_trust import PublisherTrust
 from surveillance_runtime.qos import STATE_QOS
+from surveillance_runtime.topic_names import asked_as
 
 M = TypeVar('M')
 
@@ -63,7 +64,7 @@ def publishers_of(node: PatrolNode, topic: str) -> dict[bytes, str]:
     """
     return {
         bytes(end.endpoint_gid): f'{end.node_namespace.rstrip("/")}/{end.node_name}'
-        for end in node.get_publishers_info_by_topic(topic)
+        for end in node.get_publishers_info_by_topic(asked_as(node, topic))
     }
 
 

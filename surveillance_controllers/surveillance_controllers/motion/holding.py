@@ -27,12 +27,13 @@ from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.state_topics import StateSubscription
 from surveillance_runtime.stop_keeper import StopKeeper
 from surveillance_runtime.stop_request import TOPIC, StopRequest, own_stop
+from surveillance_runtime.topic_names import BASE_COMMAND
 
 STOPPED = 'stopped'
 """Topic of `collision_monitor`: a person has stopped the robot."""
 PAUSED = 'paused'
 """Topic of `robot_behavior`: its state machine is paused."""
-COMMAND = 'cmd_vel_monitored'
+COMMAND = BASE_COMMAND
 """Topic that the base listens to: of `collision_monitor`, or of nobody while that is dead."""
 ALONE_AFTER = 0.1
 """Seconds of real time after which a wish that the monitor has not taken goes to the base itself;
@@ -121,8 +122,7 @@ class Hold:
             self._halting.cancel()
             return
         if self._halt_publisher is None:
-            topic = self._node.resolve_topic_name(COMMAND)
-            for base in self._node.get_subscriptions_info_by_topic(topic):
+            for base in self._node.get_subscriptions_info_by_topic(COMMAND):
                 kind = _COMMANDS.get(base.topic_type)
                 if kind is not None:
                     self._halt_type = kind
