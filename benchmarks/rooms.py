@@ -2,13 +2,14 @@
 """Measure how well rooms are found on maps with drawn truth, beside a plain watershed.
 
     .venv/bin/python benchmarks/rooms.py FOLDER [--doors] [--turned] [--quick]
+    .venv/bin/python benchmarks/rooms.py --drawn COUNT [--seed N] [--doors] [--clicks]
 
 FOLDER holds `NAME.png`, `NAME_furnitures.png` and `NAME_gt_segmentation.png`, as the collection of
 Bormann et al., "Room Segmentation: Survey, Implementation, and Analysis" (ICRA 2016) has them:
 0.05 m a pixel; in the truth, rooms are white and closed by black lines. Recall and precision are
 that survey's; "matched" is the share of true rooms that a found one overlaps (intersection over
 union) by at least 0.7. The peer: distance transform, the threshold with most components as seeds,
-watershed.
+watershed. `--drawn` takes plans that are drawn from a seed (`drawn_plans`) in place of a folder.
 
 `--doors` prints how many of the openings between true rooms are found: a line that was drawn
 between two rooms, free in the map and wide enough for the robot, counts as found if the middle of a
@@ -18,10 +19,13 @@ proposed door lies within 0.5 m of it; a proposed door with no such line within 
 from __future__ import annotations
 
 import argparse
+import random
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +36,7 @@ from skimage.segmentation import watershed
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.drawn_plans import drawn_plan
 from benchmarks.sizes import Size, sized_parser
 from floor_plans.map_rooms import propose, segment
 from floor_plans.occupancy_map import OccupancyMap, read_map
@@ -79,16 +84,17 @@ def true_doors(image: Image, drawn: Image, truth: Labels) -> list[NDArray[np.flo
     return found
 
 
-def door_scores(image: Image, drawn: Image, truth: Labels) -> tuple[int, int, int, int]:
+def door_scores(
+    image: Image, resolution: float, lines: list[NDArray[np.float64]]
+) -> tuple[int, int, int, int]:
     """Return how many true doors there are and are found, how many proposed and how many false."""
-    placed = propose(as_map(image), RADIUS).parameters.get('doors', {})
-    own = np.array([row[:2] for row in placed.values()]).reshape(-1, 2) / 0.05
+    placed = propose(as_map(image, resolution), RADIUS).parameters.get('doors', {})
+    own = np.array([row[:2] for row in placed.values()]).reshape(-1, 2) / resolution
     own[:, 1] = image.shape[0] - own[:, 1]
-    lines = true_doors(image, drawn, truth)
     gaps = np.array([[np.hypot(*(line - door).T).min() for line in lines] for door in own]).reshape(
         len(own), len(lines)
     )
-    near = gaps <= NEAR / 0.05
+    near = gaps <= NEAR / resolution
     return len(lines), int(near.any(axis=0).sum()), len(own), int((~near.any(axis=1)).sum())
 
 
@@ -156,10 +162,10 @@ def scores(found: Labels, truth: Labels) -> tuple[float, float, float]:
 
 
 def variants(
-    image: Image, truth: Labels, turned: bool
+    image: Image, resolution: float, truth: Labels, turned: bool
 ) -> Iterator[tuple[str, float, Image, Labels]]:
-    """Yield a map and its truth as it is, and at other resolutions and turned."""
-    yield 'as drawn', 0.05, image, truth
+    """Yield a map and its truth as it is, and one of 0.05 m at other resolutions and turned."""
+    yield 'as drawn', resolution, image, truth
     if not turned:
         return
     rows, columns = image.shape
@@ -191,15 +197,24 @@ def main() -> int:
     parser.add_argument('--doors', action='store_true', help='the doors, too')
     parser.add_argument('--clicks', action='store_true', help='corrections in the editor, too')
     parser.add_argument('--each', action='store_true', help='a line for each map')
+    parser.add_argument('--drawn', type=int, metavar='COUNT', help='plans drawn from seeds')
+    parser.add_argument('--seed', type=int, help='the first seed of those; none: any')
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as example:
         if options.size is Size.SMOKE:
-            options.folder = Path(example)
             options.doors = options.clicks = options.turned = True
-            draw_example(options.folder)
+            draw_example(Path(example))
+            cases = chain(cases_of(Path(example), options.size), drawn_cases(1, 3))
+        elif options.drawn:
+            seed = random.randrange(1_000_000) if options.seed is None else options.seed
+            print(f'seeds {seed} to {seed + options.drawn - 1}')
+            options.turned = False
+            cases = drawn_cases(options.drawn, seed)
         elif options.folder is None:
-            parser.error('the folder with maps is missing')
-        measure(options)
+            parser.error('the folder with maps is missing, or --drawn')
+        else:
+            cases = cases_of(options.folder, options.size)
+        measure(options, cases)
     return 0
 
 
@@ -213,39 +228,69 @@ def draw_example(folder: Path) -> None:
         cv2.imwrite(str(folder / f'example{ending}'), picture)
 
 
-def measure(options: argparse.Namespace) -> None:
-    """Measure the maps of a folder and print the tables."""
-    names = sorted(path.name.removesuffix(TRUTH) for path in options.folder.glob('*' + TRUTH))
+@dataclass(frozen=True)
+class Case:
+    """A map with its truth: how it is called, what kind it is, the picture, rooms and doors."""
+
+    name: str
+    kind: str
+    image: Image
+    resolution: float
+    truth: Labels
+    doors: list[NDArray[np.float64]]
+
+
+def cases_of(folder: Path, size: Size) -> Iterator[Case]:
+    """Yield the maps of a folder, each empty and furnished."""
+    names = sorted(path.name.removesuffix(TRUTH) for path in folder.glob('*' + TRUTH))
+    for name in size.of(names, names[:3], names):
+        drawn: Any = cv2.imread(str(folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
+        truth = true_rooms(drawn)
+        for kind, ending in (('empty', '.png'), ('furnished', '_furnitures.png')):
+            image: Any = cv2.imread(str(folder / (name + ending)), cv2.IMREAD_GRAYSCALE)
+            yield Case(name, kind, image, 0.05, truth, true_doors(image, drawn, truth))
+
+
+def drawn_cases(count: int, seed: int) -> Iterator[Case]:
+    """Yield plans drawn from a seed and those after it, each empty and furnished."""
+    for number in range(seed, seed + count):
+        for kind in ('empty', 'furnished'):
+            plan = drawn_plan(number, kind == 'furnished')
+            name = f'seed {number}'
+            yield Case(name, kind, plan.image, plan.resolution, plan.truth, plan.doors)
+
+
+def measure(options: argparse.Namespace, cases: Iterable[Case]) -> None:
+    """Measure maps and print the tables."""
     methods: dict[str, Callable[[Image, float], Labels]] = {'watershed': peer, 'ours': ours}
     results: dict[tuple[str, str, str], list[tuple[float, ...]]] = {}
     doors: dict[str, list[tuple[int, ...]]] = {}
     clicks: dict[str, list[tuple[int, int]]] = {}
-    for name in options.size.of(names, names[:3], names):
-        drawn: Any = cv2.imread(str(options.folder / (name + TRUTH)), cv2.IMREAD_GRAYSCALE)
-        truth = true_rooms(drawn)
-        for kind, ending in (('empty', '.png'), ('furnished', '_furnitures.png')):
-            image: Any = cv2.imread(str(options.folder / (name + ending)), cv2.IMREAD_GRAYSCALE)
-            if options.doors:
-                doors.setdefault(kind, []).append(door_scores(image, drawn, truth))
-                if options.each:
-                    print(name, kind, 'doors', *doors[kind][-1])
-            for variant, side, other, true in variants(image, truth, options.turned):
-                for method, find in methods.items():
-                    begin = time.perf_counter()
-                    labels = find(other, side)
-                    seconds = time.perf_counter() - begin
-                    if labels.shape != true.shape:
-                        size = (true.shape[1], true.shape[0])
-                        labels = cv2.resize(
-                            labels.astype(np.float32), size, interpolation=cv2.INTER_NEAREST
-                        ).astype(np.int32)
-                    row = (*scores(labels, true), seconds)
-                    if options.clicks and (method, variant) == ('ours', 'as drawn'):
-                        rooms = len(np.unique(true[true > 0]))
-                        clicks.setdefault(kind, []).append((rooms, corrections(labels, true)))
-                    results.setdefault((kind, variant, method), []).append(row)
-                    if options.each and method == 'ours':
-                        print(name, kind, variant, *(f'{value:.3f}' for value in row))
+    for case in cases:
+        name, kind, image, truth = case.name, case.kind, case.image, case.truth
+        if options.doors:
+            doors.setdefault(kind, []).append(door_scores(image, case.resolution, case.doors))
+            if options.each:
+                print(name, kind, 'doors', *doors[kind][-1])
+        for variant, side, other, true in variants(image, case.resolution, truth, options.turned):
+            for method, find in methods.items():
+                begin = time.perf_counter()
+                labels = find(other, side)
+                seconds = time.perf_counter() - begin
+                if labels.shape != true.shape:
+                    size = (true.shape[1], true.shape[0])
+                    labels = cv2.resize(
+                        labels.astype(np.float32), size, interpolation=cv2.INTER_NEAREST
+                    ).astype(np.int32)
+                row = (*scores(labels, true), seconds)
+                if options.clicks and (method, variant) == ('ours', 'as drawn'):
+                    rooms = len(np.unique(true[true > 0]))
+                    clicks.setdefault(kind, []).append((rooms, corrections(labels, true)))
+                    if options.each:
+                        print(name, kind, 'clicks', clicks[kind][-1][1], 'rooms', rooms)
+                results.setdefault((kind, variant, method), []).append(row)
+                if options.each and method == 'ours':
+                    print(name, kind, variant, *(f'{value:.3f}' for value in row), flush=True)
     print(f'{"maps":10} {"variant":14} {"method":10} recall precision matched  seconds')
     for (kind, variant, method), rows in results.items():
         recall, precision, matched, seconds = np.mean(rows, axis=0)
