@@ -221,7 +221,8 @@ def _found_picture(file: YamlFile, image: str) -> Path:
     listed = ', '.join(each.name for each in (same or there)[:_MOST_LISTED])
     found = f'the pictures there are {listed}' if listed else 'there is no picture'
     also = f', nor is {beside}' if beside != named else ''
-    raise file.error(('image',), f'{named}: no such file{also}; {found}: expected its name')
+    what = 'a link that leads to no file' if os.path.islink(named) else 'no such file'
+    raise file.error(('image',), f'{named}: {what}{also}; {found}: expected its name')
 
 
 def _pictures_in(folder: Path) -> list[Path]:
@@ -421,7 +422,9 @@ def _in_8_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
     """Return samples of 16 bits, rounded; those of 8 bits as they are."""
     if samples.dtype == np.uint8:
         return samples
-    rounded: NDArray[np.uint8] = ((samples.astype(np.uint32) + 128) // 257).astype(np.uint8)
+    rounded = np.empty(samples.shape, np.uint8)
+    for top in range(0, len(samples), 256):  # 4 bytes of each, some rows at a time
+        rounded[top : top + 256] = (samples[top : top + 256].astype(np.uint32) + 128) // 257
     return rounded
 
 
@@ -433,7 +436,9 @@ def _channels(picture: Path, image: Image.Image) -> NDArray[Any]:
 
         samples = cv2.imread(str(picture), cv2.IMREAD_UNCHANGED)
         if samples is not None and samples.dtype == np.uint16:
-            return np.asarray(samples[..., [2, 1, 0, *range(3, samples.shape[2])]])
+            # In its own memory: a copy of the largest takes 800 MB.
+            order = cv2.COLOR_BGRA2RGBA if samples.shape[2] == 4 else cv2.COLOR_BGR2RGB
+            return np.asarray(cv2.cvtColor(samples, order, samples))
     if image.mode == 'P' or 'transparency' in image.info:
         image = image.convert('RGBA' if 'transparency' in image.info else 'RGB')
     elif image.mode == '1':

@@ -118,3 +118,17 @@ def test_a_map_without_floor_is_told_what_it_has(value: int, said: str) -> None:
     cells = np.full((50, 50), value, np.int8)
     with pytest.raises(ValueError, match=f'no cell of the map is free .*{said}'):
         propose(OccupancyMap(Path('map.yaml'), cells, 0.05, (0.0, 0.0, 0.0)), 0.22)
+
+
+def test_furniture_across_a_room_makes_no_rooms_of_it() -> None:
+    building = hall(0.05, 14.0, 3.6)
+    cells = building.cells.copy()
+    cells[:, 139:141] = 100
+    cells[26:46, 139:141] = 0  # the door
+    # A table in the middle, a bed at the wall.
+    for rows, columns in (((20, 52), (56, 82)), ((2, 44), (200, 232))):
+        # The laser sees their faces alone.
+        cells[slice(*rows), slice(*columns)] = 100
+        cells[rows[0] + 1 : rows[1] - 1, columns[0] + 1 : columns[1] - 1] = -1
+    found = propose(replace(building, cells=cells), RADIUS).parameters
+    assert (len(found['map']), list(found['doors'])) == (2, ['D1'])

@@ -61,18 +61,24 @@ class Cut:
     narrow: bool = False
 
 
-def wall_cuts(free: Mask, solid: Mask) -> list[Cut]:
+def wall_cuts(free: Mask, solid: Mask, furniture: Mask) -> list[Cut]:
     """Return the cuts that walls suggest.
 
     Args:
         free: Cells in which nothing stands, shape (rows, columns).
         solid: Cells in which something stands; others are unknown, and where the floor ends there
             it ends at no wall.
+        furniture: Cells of what stands there and is no wall: no such cut begins or ends at it.
     """
+    beside = cv2.dilate(furniture.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     points, directions = _edge_ends(free, solid)
     if not len(points):
         return []
-    return [*_continued(free, points, directions), *_facing(free, points, directions)]
+    found = [*_continued(free, points, directions), *_facing(free, points, directions)]
+    ends = np.array([(cut.start, cut.end) for cut in found]).reshape(-1, 2, 2)
+    cells = np.clip(np.rint(ends).astype(int), 0, np.array(free.shape[::-1]) - 1)
+    at_furniture = beside[cells[..., 1], cells[..., 0]].any(axis=1)
+    return [cut for cut, drop in zip(found, at_furniture.tolist(), strict=True) if not drop]
 
 
 def _edge_ends(free: Mask, solid: Mask) -> tuple[Floats, Floats]:

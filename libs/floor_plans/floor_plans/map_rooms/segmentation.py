@@ -38,6 +38,18 @@ _WALL = 0.6
 """A strip of unknown cells up to this width is taken for the inside of a wall, metres."""
 _THICK = 0.15
 """Half the thickness from which on what stands there may be furniture, metres."""
+_BLOCK = 0.45
+"""Thickness from which on what is compact is no wall, if it stands at one, metres."""
+_ISLAND = 0.25
+"""The same of what stands free."""
+_TABLE = 1.1
+"""What stands free and is shorter may be a column, metres."""
+_FILLED = 0.8
+"""A block fills so much of the rectangle around it."""
+_LONGEST = 3.0
+"""Furniture is at most so long, metres."""
+_SLENDER = 4.5
+"""What is so many times longer than thick is a wall."""
 _BENEATH = 0.9
 """Floor that lies deeper below furniture is not given to the room beside it, metres."""
 _NARROW = 0.7
@@ -114,11 +126,12 @@ def segment(grid: Grid, shut: Sequence[Line] = ()) -> Segmentation:
     free = working.free
     known = _drawn(shut, free.shape, grid.cells.shape[1] * grid.resolution / free.shape[1])
     cleared = _without_small_things(free) & ~known
+    furniture = _furniture(cleared)
     clearance = distance_to(~cleared, CELL)
-    found = openings.wall_cuts(cleared, _walls(working)) + openings.saddle_cuts(
+    found = openings.wall_cuts(cleared, _walls(working), furniture) + openings.saddle_cuts(
         cleared, _saddles(cleared, clearance)
     )
-    kept = openings.narrowing(openings.without_doubles(found), cleared)
+    kept = openings.narrowing(openings.without_doubles(found), cleared | furniture)
     cuts = openings.drawn(kept, cleared.shape)
     parts = np.asarray(
         cv2.connectedComponents((cleared & (cuts == 0)).astype(np.uint8), connectivity=4)[1],
@@ -203,6 +216,54 @@ def _without_small_things(free: Mask) -> Mask:
     small = (sizes < _FURNITURE) & ~_at_edge(stats, free.shape)
     small[0] = False
     return np.asarray(free | looked_up(small, pieces))
+
+
+def _furniture(free: Mask) -> Mask:
+    """Return what stands there and is furniture by its shape: a compact block, thicker than walls.
+
+    It stands free, or at a wall; of that, what is behind it is taken, too.
+    """
+    side = 2 * round(_BLOCK / 2 / CELL) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    solid = (~free | _closed(free)).astype(np.uint8)
+    thick = cv2.morphologyEx(
+        solid, cv2.MORPH_OPEN, disc, borderType=cv2.BORDER_CONSTANT, borderValue=1
+    )
+    found = np.zeros(free.shape, np.bool_)
+    for mask, thinnest, shortest in ((thick, _BLOCK, _BLOCK), (solid, _ISLAND, _TABLE)):
+        pieces, stats = cv2.connectedComponentsWithStats(mask, connectivity=8)[1:3]
+        spans = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) * CELL
+        small = (spans >= shortest) & (spans < 1.42 * _LONGEST) & ~_at_edge(stats, free.shape)
+        small[0] = False
+        for piece in np.flatnonzero(small).tolist():
+            left, top, width, height = stats[piece, :4].tolist()
+            box = np.s_[top : top + height, left : left + width]
+            own = pieces[box] == piece
+            short, long = _sides(own)
+            if short >= thinnest and shortest <= long <= _LONGEST and long < _SLENDER * short:
+                found[box] |= own
+        del pieces  # four bytes of each cell
+    return found
+
+
+def _closed(free: Mask) -> Mask:
+    """Return the closed parts of the floor that are too small for rooms; none: all are small."""
+    pieces, stats = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4)[1:3]
+    tiny = stats[:, cv2.CC_STAT_AREA] * CELL**2 < SMALLEST_ROOM
+    if tiny[1:].all():
+        return np.zeros_like(free)
+    tiny[0] = False
+    return looked_up(tiny, pieces)
+
+
+def _sides(piece: Mask) -> tuple[float, float]:
+    """Return the shorter and the longer side of a block, metres; 0, 0: it is none."""
+    outlines = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max(outlines[0], key=len)
+    short, long = sorted((each + 1) * CELL for each in cv2.minAreaRect(outline)[1])
+    # The outline runs through the middles of its cells.
+    area = (cv2.contourArea(outline) + len(outline) / 2 + 1) * CELL**2
+    return (short, long) if area >= _FILLED * short * long else (0.0, 0.0)
 
 
 def _at_edge(stats: NDArray[Any], shape: tuple[int, ...]) -> Mask:
@@ -307,15 +368,8 @@ def _meeting(
 
 def _with_floor_below_furniture(labels: Labels, free: Mask) -> Labels:
     """Return labels that cover furniture and the small closed parts of the floor, too."""
-    pieces, stats = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4)[1:3]
-    tiny = stats[:, cv2.CC_STAT_AREA] * CELL**2 < SMALLEST_ROOM
-    tiny[0] = False
-    closed = looked_up(tiny, pieces)
-    del pieces
-    if (free & ~closed).any():
-        labels[closed] = 0
-    else:
-        closed = np.zeros_like(closed)  # the map has no larger part
+    closed = _closed(free)
+    labels[closed] = 0
     side = 2 * int(_THICK / CELL) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
     solid = (~free | closed).astype(np.uint8)
