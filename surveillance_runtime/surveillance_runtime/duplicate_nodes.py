@@ -33,6 +33,7 @@ from surveillance_runtime.launch_protocol import AGE, EXIT_THERE, LAUNCH, launch
 from surveillance_runtime.message_source import SOURCE
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import RUN_NODES
+from surveillance_runtime.periods import every
 from surveillance_runtime.state_topics import publishers_of
 
 ALIVE = 3.5 * PERIOD
@@ -177,7 +178,7 @@ class DuplicateNodeWatch:
         self._duplicates = DuplicateNodes(self._own)
         self._told: set[str] = set()
         _Ears(node, self._duplicates)
-        node.every(PERIOD, self._look)
+        every(node, PERIOD, self._look)
 
     def _look(self) -> None:
         found = self._duplicates.launches(time.monotonic())

@@ -20,6 +20,7 @@ from sensor_msgs.msg import BatteryState, CameraInfo, Image, LaserScan
 from surveillance_runtime.conversions import seconds_of
 from surveillance_runtime.incidents import Severity
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.periods import every
 from surveillance_runtime.profile.check_up import (
     BASE_FRAMES,
     NAMELESS,
@@ -274,7 +275,7 @@ class InputWatch:
         self._now = now
         self._silent = {each.topic: 0.0 for each in wanted}
         self._looked_at = math.inf
-        node.every(LOOK_PERIOD, self._look)
+        every(node, LOOK_PERIOD, self._look)
 
     def _look(self) -> None:
         now, missing = self._now(), set(self._missing())

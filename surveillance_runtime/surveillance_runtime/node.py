@@ -54,6 +54,7 @@ from surveillance_runtime.incidents import Incidents, IncidentUpdate, Severity
 from surveillance_runtime.logging import CleanLogger
 from surveillance_runtime.message_bounds import check_asked, check_length, lists_of
 from surveillance_runtime.parameters import ParameterError, ParameterSpec, specs_of, with_values
+from surveillance_runtime.periods import every
 
 if TYPE_CHECKING:
     from surveillance_runtime.parameters import Record
@@ -130,7 +131,6 @@ class PatrolNode(Node):
         self._threads: list[threading.Thread] = []
         self._spawning = threading.Lock()
         self._owned: list[Destroyable] = []
-        self._periodic: dict[float, list[tuple[float, Callable[[], object]]]] = {}
         self._overrides_given: dict[str, Setting] = {}
         if _given is not None and 'parameter_overrides' not in node_options:
             arguments, given = _given
@@ -153,7 +153,7 @@ class PatrolNode(Node):
         robot = self.get_namespace().rpartition('/')[2]
         now = lambda: 1e-9 * self.get_clock().now().nanoseconds  # noqa: E731
         self.incidents = Incidents(self._tell_incident, name, robot, now, time.monotonic)
-        self.every(INCIDENT_PERIOD, self.incidents.advance)
+        every(self, INCIDENT_PERIOD, self.incidents.advance)
         self.add_on_set_parameters_callback(self._check_parameters)
         self.add_post_set_parameters_callback(self._tell_parameters)
 
@@ -338,39 +338,6 @@ class PatrolNode(Node):
         if options.get('clock') is None and not self.get_parameter('use_sim_time').value:
             options['clock'] = Clock(clock_type=ClockType.STEADY_TIME)
         return super().create_timer(*args, **options)
-
-    def every(self, period: float, call: Callable[[], object]) -> None:
-        """Call something each period of steady time, with all else that has this period.
-
-        The periods of all nodes of a machine begin together: fewer wakeups than each by itself.
-
-        Args:
-            period: Seconds.
-            call: First called after one to two periods, then for as long as the node is there.
-        """
-        first = time.monotonic() + 0.999 * period
-        if (calls := self._periodic.get(period)) is not None:
-            calls.append((first, call))
-            return
-        calls = self._periodic[period] = [(first, call)]
-        nanoseconds = round(1e9 * period)
-
-        def on_period() -> None:
-            if timer.timer_period_ns != nanoseconds:
-                timer.timer_period_ns = nanoseconds
-                timer.reset()
-            now, failed = time.monotonic(), None
-            for due, each in tuple(calls):
-                try:
-                    if now >= due:
-                        each()
-                except Exception as error:  # the others are called all the same
-                    failed = error
-            if failed is not None:
-                raise failed
-
-        ahead = max(0.001, period - time.monotonic() % period)
-        timer = self.create_timer(ahead, on_period, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def create_service(  # type: ignore[override]  # rclpy's has no room for further options
         self, srv_type: Any, name: str, callback: Callable[..., Any], **options: Any

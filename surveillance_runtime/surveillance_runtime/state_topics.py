@@ -25,6 +25,7 @@ from surveillance_runtime.message_bounds import check_bytes
 from surveillance_runtime.message_source import SOURCE
 from surveillance_runtime.node import PatrolNode
 from surveillance_runtime.node_table import RUN_NODES
+from surveillance_runtime.periods import every
 from surveillance_runtime.publisher_trust import PublisherTrust
 from surveillance_runtime.qos import STATE_QOS
 from surveillance_runtime.topic_names import asked_as
@@ -98,7 +99,7 @@ class OwnedTopic(Generic[M]):
         node.create_subscription(kind, name, self._on_heard, STATE_QOS, raw=True)
         self._repeats = repeat is not None
         self._said_at = 0.0
-        node.every(repeat or REPEAT, self._on_period)
+        every(node, repeat or REPEAT, self._on_period)
 
     def publish(self, message: M) -> None:
         """Publish a state."""

@@ -11,6 +11,7 @@ from surveillance_runtime.alarms import SILENT_AFTER
 from surveillance_runtime.graph_check import InputWatch
 from surveillance_runtime.incidents import Incidents, Severity
 from surveillance_runtime.node import PatrolNode
+from surveillance_runtime.periods import every
 from surveillance_runtime.profile.check_up import GraphSample, TopicSample, awaited
 from surveillance_runtime.profile.record import Frames, RobotProfile, Topics
 from surveillance_runtime.profile.truth_check import doubts
@@ -103,8 +104,8 @@ class SensorWatch:
         self._silence = SilenceWatch(node.incidents, streams.values())
         self._node, self._profile = node, replace(RobotProfile(), topics=topics, frames=frames)
         self._streams, self._child = streams, child
-        node.every(LOOK_PERIOD, lambda: self._silence.look(time.monotonic()))
-        node.every(DOUBT_PERIOD, self._doubt)
+        every(node, LOOK_PERIOD, lambda: self._silence.look(time.monotonic()))
+        every(node, DOUBT_PERIOD, self._doubt)
 
     def _doubt(self) -> None:
         """Doubt what comes, as `doctor` does; `StateSubscription` tells of a second publisher."""
