@@ -513,6 +513,24 @@ def test_subscribers_are_told_of_what_others_write(served: Served) -> None:
     assert came.wait(60.0)
 
 
+def test_what_others_write_in_the_middle_of_a_list_does_not_cut_it(served: Served) -> None:
+    """A list is in the file as a whole or not at all, at whatever moment the process ends."""
+
+    def written() -> set[str]:
+        with closing(sqlite3.connect(served.path)) as db:
+            rows = db.execute('SELECT iri FROM resources').fetchall()
+        return {iri.partition('#')[2] for (iri,) in rows} & {'early', 'foreign', 'late'}
+
+    ref = served.service.workspace.references.find('map')
+    with ref.lock, served.store.batch():
+        assert served.ask('ADD IND CLASS', 'early', 'DOOR').success
+        served.run("with onto: onto.DOOR('foreign')\nworld.save()\n")
+        assert served.ask('ADD IND CLASS', 'late', 'DOOR').success
+        assert written() == {'foreign'}
+    assert written() == {'early', 'foreign', 'late'}
+    served.until(lambda: 'foreign' in served.names('QUERY IND CLASS', 'DOOR'))
+
+
 def test_sql_alone_is_heard_as_well(served: Served) -> None:
     with closing(sqlite3.connect(served.path)) as db:
         names_of = dict(db.execute('SELECT iri, storid FROM resources'))

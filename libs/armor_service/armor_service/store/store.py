@@ -158,7 +158,12 @@ class Store:
             raise StoreError(f'{self.directory}: closed')
 
     def take_in(self, ref: Reference) -> None:
-        """Take in what other programs wrote by now; call it under the reference's lock."""
+        """Take in what other programs wrote by now; call it under the reference's lock.
+
+        Not in the middle of a batch: what it changed so far would be written without the rest.
+        """
+        if ref.name in (getattr(self._batch, 'references', None) or ()):
+            return
         file = self._files.get(ref.name)
         if file is not None and file.ref is ref and not file.is_behind and file.has_foreign():
             file.attend()
