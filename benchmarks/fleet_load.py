@@ -167,7 +167,7 @@ def armor_under(robots: int, seconds: float, place: Path) -> None:
                             taken['move'].append(time.perf_counter() - began)
                         began = time.perf_counter()
                         now = time.time()
-                        ontology.state(now, CLASSES, visits={here: now}, threshold=240.0)
+                        ontology.snapshot(now, CLASSES, visits={here: now}, threshold=240.0)
                         taken['decision'].append(time.perf_counter() - began)
                         began = time.perf_counter()
                         bare.call(Trigger.Request(), 60.0)

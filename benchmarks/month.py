@@ -102,7 +102,7 @@ class Month:
             if self._chance.random() < 0.005:
                 self.record.write('recharge', now + 2.0, place=place, seconds=120.0)
             self._ontology.record_place(place, int(now * 1e9))
-            self._ontology.state(now, CLASSES, visits={place: now})
+            self._ontology.snapshot(now, CLASSES, visits={place: now})
             yield now
 
     def close(self) -> None:

@@ -200,6 +200,7 @@ def main() -> int:
     parser.add_argument('--drawn', type=int, metavar='COUNT', help='plans drawn from seeds')
     parser.add_argument('--seed', type=int, help='the first seed of those; none: any')
     options = parser.parse_args()
+    cases: Iterable[Case]
     with tempfile.TemporaryDirectory() as example:
         if options.size is Size.SMOKE:
             options.doors = options.clicks = options.turned = True

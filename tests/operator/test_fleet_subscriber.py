@@ -57,7 +57,7 @@ def test_robots_are_found_and_told_apart_and_share_the_place(graph: Any) -> None
     assert (anna.task.battery, bertha.task.battery) == (40.0, 60.0)
     assert anna.task.fleet_report == FleetReport(('A', 'anna'), 'anna', runs_until=9.0)
     assert anna.place.doors == bertha.place.doors == {'D': False}
-    assert anna.health.reports.reports.keys() == {'anna/motion_controller', 'armor_server'}
+    assert anna.health.reports.keys() == {'anna/motion_controller', 'armor_server'}
     assert list(subscriber.see()) == ['anna', 'bertha', ''], 'what they share is last'
     topics = ('/diagnostics', watcher.resolve_topic_name('fleet_robots'), '/clock')
     heard_by = [len(watcher.get_subscriptions_info_by_topic(topic)) for topic in topics]

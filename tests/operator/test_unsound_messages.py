@@ -52,7 +52,7 @@ def test_a_message_that_cannot_be_used_is_said_and_changes_nothing(
 ) -> None:
     before = MissionState().having(pose=(0.0, 0.0, 0.0), battery=50.0)
     after = read_message(before, TOPIC[topic], message)
-    assert words in after.health.reports.silent[topic]
+    assert words in after.health.silent[topic]
     assert after.task.battery == 50.0
     assert after.place.grid is None
 
