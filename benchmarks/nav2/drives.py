@@ -345,7 +345,8 @@ def last_line(file: Path) -> dict[str, Any]:
 STAGE = """
 import json
 from std_msgs.msg import String
-publisher = node.create_publisher(String, 'stage', 10)
+from surveillance_runtime.qos import STATE_QOS
+publisher = node.create_publisher(String, 'stage', STATE_QOS)
 while not publisher.get_subscription_count():
     rclpy.spin_once(node, timeout_sec=0.1)
 for name, value in staged.items():
@@ -392,7 +393,6 @@ while not publisher.get_subscription_count():
     rclpy.spin_once(node, timeout_sec=0.1)
 if pose is None:
     with open(trace, 'rb') as opened:
-        opened.seek(-4000, 2)
         pose = json.loads(opened.read().splitlines()[-2])['pose']
 message = PoseWithCovarianceStamped(pose=pose_estimate(pose, 0.3, 0.2))
 message.header.frame_id = 'map'

@@ -83,7 +83,8 @@ class ForeignRobot(Node):
             self._battery = self.create_publisher(BatteryState, 'battery_state', 10)
             self.create_timer(1.0, self._tell_battery)
         self.create_subscription(TwistStamped, 'cmd_vel', self._on_command, 10)
-        self.create_subscription(String, 'stage', self._on_stage, 10)
+        # Latched: who stages something ends as soon as this is told, known to it or not.
+        self.create_subscription(String, 'stage', self._on_stage, STATE_QOS)
         self.create_subscription(TFMessage, 'tf', self._on_transforms, 100)
         at_middle = (0.0, 0.0, 0.0)
         frames = [self._frame(FOOT, BASE, at_middle), self._frame(BASE, LASER, at_middle)]
