@@ -123,6 +123,7 @@ KNOWING_ROS = {
     'surveillance_runtime.machine_messages',
     'surveillance_runtime.duplicate_nodes',
     'surveillance_runtime.node',
+    'surveillance_runtime.periods',
     'surveillance_runtime.place_changes',
     'surveillance_runtime.process',
     'surveillance_runtime.qos',

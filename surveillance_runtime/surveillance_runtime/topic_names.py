@@ -6,7 +6,10 @@ answered about that one. What the base hears is asked for by the name that leads
 
 from __future__ import annotations
 
-from rclpy.node import Node
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 BASE_COMMAND = 'cmd_vel_monitored'
 """What the base hears, before a run's remappings."""

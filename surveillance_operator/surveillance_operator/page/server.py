@@ -273,6 +273,7 @@ class Page:
             'live': int(self._front != name),
             'past': int('past' in self._questions),
             'search': int('search' in self._questions),
+            'baseline': int('baseline' in self._questions),
             'mutes': int('mute' in self._actions),
             'sinks': int('sinks' in self._actions),
             'rules': int('rule' in self._actions),

@@ -41,7 +41,7 @@ const map = new MapView($('map'), (place) => { why.choose(place); control.choose
 const replay = replaying ? new Replay() : null;
 const alarms = new Alarms({may: guard && !replaying, wall, onChoose: (event) => map.lookAt(event.position)});
 const search = new Search({may: guard && !replaying, operator: may && !replaying, wall, jump: replaying ? (at) => { replay.jump(at); open('desk'); } : null});
-if (!replaying) new Baseline({may: guard});
+if (root.dataset.baseline === '1') new Baseline({may: guard});
 map.addLayer('events', alarms.spots);
 const fleet = new Fleet(robots, may && !replaying, look);
 let asked = new URLSearchParams(location.search).get('robot');
