@@ -2,10 +2,10 @@
 
 It stands between whoever commands `cmd_vel` (`motion_controller`, a joystick, any other program)
 and the base, which listens to `cmd_vel_monitored`. A command is slowed down so that the robot can
-brake before the nearest thing on its arc. Without a fresh scan, or without a fresh command, the
-robot slows down by the age of the last one until it stands. What a person commands by hand
-(`cmd_vel_manual`, of the page) comes before `cmd_vel` while it lasts, and is limited alike. As a
-process of its own the monitor also stops a robot whose controller hangs.
+brake before the nearest thing on its arc. Without a fresh scan the robot slows down by the age of
+the last one until it stands; without a fresh command it stands at once. What a person commands by
+hand (`cmd_vel_manual`, of the page) comes before `cmd_vel` while it lasts, and is limited alike. As
+a process of its own the monitor also stops a robot whose controller hangs.
 
 Keep-out zones stand in the way as walls do, and in slow zones the speed is theirs, as long as
 somebody tells where the robot is (`amcl_pose`).
@@ -109,8 +109,8 @@ class MonitorSettings:
     deceleration: float = robot_deceleration()
     longest_silence: float = parameter(
         LONGEST_SILENCE,
-        'The robot stands when scan or cmd_vel is overdue by this, sooner where something is near, '
-        'and brakes before, s of ROS time.',
+        'The robot stands when scan is overdue by this, sooner where something is near or cmd_vel '
+        'is overdue alone, and brakes before, s of ROS time.',
         0.05,
         10.0,
     )
@@ -205,6 +205,7 @@ class CollisionMonitor(PatrolNode):
             min(STANDSTILL, self._settings.longest_silence),
             frames.base,
             self._patience,
+            'cmd_vel',
         )
         if self._settings.wanted_type == 'TwistStamped':
             self.create_subscription(TwistStamped, 'cmd_vel', self._on_stamped_command, 1)
@@ -371,12 +372,8 @@ class CollisionMonitor(PatrolNode):
         return np.concatenate(near) if near else np.empty((0, 2))
 
     def _patience(self, velocity: Velocity) -> float:
-        """Return how long the robot may take to stand when what it sees, or its command, is
-        overdue, seconds.
-        """
+        """Return how long the robot may take to stand when its scans are overdue, seconds."""
         longest = self._settings.longest_silence
-        if time.monotonic() < self._manual_until:
-            return min(STANDSTILL, longest)  # a hand let go
         far = self._settings.reach + (abs(velocity.speed) + WALKING) * (longest + LATENCY)
         near = self._near(far, self._pose_now())
         return blind_time(velocity, near, self._settings.body, self._settings.margin, longest)

@@ -170,10 +170,11 @@ class Bases:
             CommandPublisher(
                 graph.add(PatrolNode, name=f'commander{number}'),
                 'cmd_vel',
-                ['scan'],
+                ['scan', *['wanted'][:number]],
                 DECELERATION,
                 lambda _topic: None,
                 patience=lambda _velocity: patience,
+                commands='wanted',
             )
             for number in range(count)
         ]
@@ -189,6 +190,7 @@ class Bases:
         if behind is None:
             self.sent = twist.linear.x
         else:
+            behind.hear('wanted')
             behind.command(Velocity(twist.linear.x))
 
     def see(self, now: float) -> None:
@@ -233,6 +235,10 @@ def test_two_that_brake_for_one_silence_brake_no_harder_than_one(
         for number in range(30):
             bases.see(0.1 * number)
         ways.append(LOOK_PERIOD * sum(bases.blind_until(4.5)))
+        for number in range(46, 60):
+            bases.see(0.1 * number)
+            # Not each step: a command and its timer may come in any order.
+            assert min(bases.blind_until(0.1 * number + 0.09)) == 0.5, number
     assert ways[1] == pytest.approx(ways[0], rel=0.1)
 
 
@@ -264,3 +270,60 @@ def test_a_robot_that_takes_longer_to_stand_meets_nothing_that_it_saw_ahead() ->
 
 def test_a_turn_on_the_spot_ends_as_soon_as_ever() -> None:
     assert blind_time(Velocity(0.0, 1.0), np.empty((0, 2)), BODY, 0.02) == STANDSTILL
+
+
+@pytest.mark.parametrize('speed', [0.1, 0.5])
+def test_a_robot_that_sees_and_that_nobody_commands_stands_as_soon_as_ever(
+    graph: Any, monkeypatch: pytest.MonkeyPatch, speed: float
+) -> None:
+    base = CommandPublisher(
+        *(graph.node, 'cmd_vel', ['scan', 'wanted'], DECELERATION, lambda _topic: None),
+        patience=lambda _velocity: LONGEST_SILENCE,
+        commands='wanted',
+    )
+    sent: list[float] = []
+    monkeypatch.setattr(
+        base, '_publisher', SimpleNamespace(publish=lambda twist: sent.append(twist.linear.x))
+    )
+    now = 0.0
+    monkeypatch.setattr(base, '_now', lambda: now)
+    rng = random.Random(3)
+    for step in range(1, 300 + 40):
+        now = 0.01 * step
+        if step % 10 == rng.choice([0, 0, 1, 2]):
+            base.hear('scan')
+        if step % 10 == 0 and step < 300:
+            base.hear('wanted')
+            base.command(Velocity(speed))
+        base._limit_again()
+    assert sent[-1] == 0.0, 'within the standstill of the first command that did not come'
+
+
+def test_commands_that_are_repeated_while_scans_are_late_are_not_expected_as_often() -> None:
+    age = SensorAge(['scan', 'wanted'], DECELERATION, commands='wanted')
+    for count in range(30):
+        age.hear('scan', 0.1 * count)
+        age.hear('wanted', 0.1 * count)
+    for count in range(20):
+        age.hear('wanted', 3.02 + 0.03 * count)
+    age.hear('scan', 3.6)
+    age.hear('wanted', 3.6)
+    assert age.share(0.6, 3.7) == 1.0
+
+
+@pytest.mark.parametrize('way', [1.0, -1.0])
+@pytest.mark.parametrize(
+    'body', [BODY, Footprint(0.22, (-0.2, -0.2, 0.2, -0.2, 0.2, 0.2, -0.2, 0.2))]
+)
+def test_who_may_step_onto_the_arc_from_its_side_counts_as_ahead(
+    way: float, body: Footprint
+) -> None:
+    velocity = Velocity(way * 0.5)
+    for x, y, is_near in (
+        *((0.0, 0.45, True), (0.0, 0.9, False)),
+        *((way * 0.5, 0.45, True), (way * 0.5, 0.9, False), (-way * 0.9, 0.0, False)),
+    ):
+        time = blind_time(velocity, np.array([[x, y]]), body, 0.02)
+        assert (time == STANDSTILL) == is_near, (x, y)
+        assert is_near or time == pytest.approx(LONGEST_SILENCE)
+    assert blind_time(velocity, np.empty((0, 2)), body, 0.02) == pytest.approx(LONGEST_SILENCE)

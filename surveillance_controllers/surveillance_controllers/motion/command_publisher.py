@@ -5,9 +5,9 @@ again, slower each time, until the robot stands: a robot that sees nothing stand
 
 From speed v the base stands after v / a seconds. Messages that come on time, or a little late,
 leave the speed as it is: it falls from the moment at which the base must brake so that it stands
-`STANDSTILL` seconds after the first message that did not come. Where nothing was seen ahead, the
-robot may take longer, up to `longest_silence` (`blind_time`): its speed falls later, and by the age
-of what it saw. The period of the messages is what they themselves show.
+`STANDSTILL` seconds after the first message that did not come. Where nothing was seen ahead, and
+scans alone are late, the robot may take longer, up to `longest_silence` (`blind_time`): its speed
+falls later, and by the age of what it saw. The period of the messages is what they themselves show.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 
+import numpy as np
 from geometry_msgs.msg import Twist, TwistStamped
 
 from lidar_navigation import Footprint, Velocity
@@ -65,6 +66,7 @@ def blind_time(
     """Return how long after a missed message the robot may take until it stands, seconds.
 
     It is the time to a collision with the nearest thing ahead, if that walks towards the robot.
+    Ahead is also what stands so near beside the arc that it may step onto it within `STANDSTILL`.
 
     Args:
         velocity: With which the robot drives.
@@ -78,6 +80,10 @@ def blind_time(
         return shortest  # a turn on the spot overshoots
     closing = abs(velocity.speed) + WALKING
     horizon = closing * (longest + LATENCY)
+    margin += WALKING * STANDSTILL
+    # What is as near already counts, too: `room_ahead` lets a robot leave it.
+    if (body.gap_at(np.zeros((1, 3)), seen) <= margin).any():
+        return shortest
     forwards = as_forwards(velocity.speed, velocity.turn, seen, body)
     room = room_ahead(*forwards, margin, horizon)
     return min(longest, max(shortest, room / closing - LATENCY))
@@ -90,11 +96,17 @@ class SensorAge:
         topics: All of them have to be heard.
         deceleration: With which the base brakes when it must, m/s^2.
         standstill: The robot stands this long after the first message that did not come, seconds.
+        commands: The one of them that wants the speed; the others see.
     """
 
     def __init__(
-        self, topics: Iterable[str], deceleration: float, standstill: float = STANDSTILL
+        self,
+        topics: Iterable[str],
+        deceleration: float,
+        standstill: float = STANDSTILL,
+        commands: str = '',
     ) -> None:
+        self._commands = commands
         self._deceleration = deceleration
         self._standstill = standstill
         self._heard = {topic: (-math.inf, deque([0.1], _COUNT)) for topic in topics}
@@ -103,7 +115,9 @@ class SensorAge:
     def hear(self, topic: str, now: float) -> None:
         """Note a message of a topic that came now, seconds."""
         before, intervals = self._heard[topic]
-        if before <= now <= before + LONGEST_PERIOD + self._standstill:
+        # Whoever drives by what is late now repeats its commands: that is not their period.
+        repeated = topic == self._commands and self.is_blind(now)
+        if before <= now <= before + LONGEST_PERIOD + self._standstill and not repeated:
             intervals.append(now - before)
         self._heard[topic] = now, intervals
         self._stands_at[topic] = (
@@ -117,6 +131,11 @@ class SensorAge:
         """
         at, topic = min((at, topic) for topic, at in self._stands_at.items())
         return at - now, topic
+
+    def is_blind(self, now: float) -> bool:
+        """Tell whether what sees, not only a command, is overdue by more than a little."""
+        sees = (at for topic, at in self._stands_at.items() if topic != self._commands)
+        return now > min(sees, default=math.inf) - self._standstill + LATE
 
     @property
     def top_speed(self) -> float:
@@ -156,8 +175,10 @@ class CommandPublisher:
             and not more often than each `TELL_AGAIN`.
         standstill: The robot stands this long after the first message that did not come, seconds.
         patience: Returns the time that a robot with some velocity may take in place of
-            `standstill`, by what it saw last, seconds. It is asked when a message is overdue, and
+            `standstill`, by what it saw last, seconds. It is asked when what sees is overdue, and
             may not wait.
+        commands: The topic of `heard` by which somebody else commands: where it alone is overdue,
+            nobody drives, and the robot may not take longer.
 
     Attributes:
         wanted: The last command, before it was limited by the age of what was heard.
@@ -175,13 +196,14 @@ class CommandPublisher:
         standstill: float = STANDSTILL,
         frame: str = '',
         patience: Callable[[Velocity], float] | None = None,
+        commands: str = '',
     ) -> None:
         stamped = node.declare_fields(CommandSettings()).command_type == 'TwistStamped'
         self._frame = frame
         self._clock = node.get_clock()
         self._logger = node.get_logger()
         self._on_silence = on_silence
-        self._age = SensorAge(heard, deceleration, standstill)
+        self._age = SensorAge(heard, deceleration, standstill, commands)
         self._standstill, self._patience = standstill, patience
         # Of what was seen last: how much longer the robot may take, and the speed it had then.
         self._more: float | None = None
@@ -200,7 +222,8 @@ class CommandPublisher:
         """Note that a message of a topic has come."""
         with self._lock:
             self._age.hear(topic, self._now())
-            self._more = None
+            if self._more:  # one that begins to stand goes on, until the next command
+                self._more = None
 
     def command(self, velocity: Velocity) -> None:
         """Publish a command as far as the age of what was heard allows it."""
@@ -236,7 +259,9 @@ class CommandPublisher:
             self._top = speed
             return 1.0
         if self._more is None:
-            longest = self._standstill if self._patience is None else self._patience(self.wanted)
+            longest = self._standstill
+            if self._patience is not None and self._age.is_blind(now):
+                longest = self._patience(self.wanted)
             self._more = max(0.0, longest - self._standstill)
         # Whoever commands may brake for the same silence: that is not to count twice.
         top = max(self._top, speed)

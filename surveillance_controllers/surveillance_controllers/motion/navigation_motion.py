@@ -298,7 +298,8 @@ class NavigationMotion:
             self._stands_for_search = True
 
     def _patience(self, velocity: Velocity) -> float:
-        seen = np.concatenate([scan.points for scan in self._seen.values()] or [np.empty((0, 2))])
+        scans = tuple(self._seen.values())  # another thread may add a lidar
+        seen = np.concatenate([scan.points for scan in scans] or [np.empty((0, 2))])
         return blind_time(velocity, seen, self._robot.body, self._robot.margin)
 
     def _warn_of_silence(self, topic: str) -> None:
