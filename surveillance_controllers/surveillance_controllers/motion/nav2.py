@@ -335,7 +335,7 @@ class Nav2Motion:
         """Compare a scan with the map, and read the doors by it."""
         if self._doubt.is_due(time.monotonic()):
             self._doubt.look(pose, scan, made)
-            self._tell_doubt(pose)
+            self._tell_doubt()
         if is_slow and not self._doubt.in_doubt:
             self._doors.see(pose, scan, made)
 
@@ -374,13 +374,13 @@ class Nav2Motion:
             self._doubt.set_map(grid)
             self._tell_pose()
 
-    def _tell_doubt(self, pose: Pose) -> None:
-        """Tell whether a pose fits what the lidar saw from there."""
+    def _tell_doubt(self) -> None:
+        """Tell whether the pose fits what the lidar saw from there."""
         if self._doubt.in_doubt:
-            x, y, _ = pose
             self._node.incidents.begin(
                 POSE,
-                f'the pose that Nav2 tells, ({x:.1f}, {y:.1f}), does not fit what the lidar sees',
+                # Without the pose, which moves: each change would be told anew.
+                'the pose that Nav2 tells does not fit what the lidar sees',
                 action='set the pose, in RViz by 2D Pose Estimate, or load the right map',
             )
         else:
