@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from weakref import WeakKeyDictionary
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.timer import Timer
 
 _Calls = list[tuple[float, Callable[[], object]]]
-_CALLS: WeakKeyDictionary[Node, dict[float, _Calls]] = WeakKeyDictionary()
+_CALLS = '_calls_by_period'
+"""What a node keeps its calls as. In a table beside the nodes they would keep their node for good:
+most are methods of what the node has."""
 
 
 def every(node: Node, period: float, call: Callable[[], object]) -> None:
@@ -23,17 +25,19 @@ def every(node: Node, period: float, call: Callable[[], object]) -> None:
         period: Seconds.
         call: First called after one to two periods, then for as long as the node is there.
     """
-    first, of_node = time.monotonic() + 0.999 * period, _CALLS.setdefault(node, {})
+    of_node: dict[float, _Calls] = vars(node).setdefault(_CALLS, {})
+    first = time.monotonic() + 0.999 * period
     if (calls := of_node.get(period)) is not None:
         calls.append((first, call))
         return
     calls = of_node[period] = [(first, call)]
-    nanoseconds = round(1e9 * period)
+    nanoseconds, made = round(1e9 * period), list[Timer]()
 
     def on_period() -> None:
-        if timer.timer_period_ns != nanoseconds:
-            timer.timer_period_ns = nanoseconds
-            timer.reset()
+        for timer in made:  # none yet where another thread spins the node and is quick
+            if timer.timer_period_ns != nanoseconds:
+                timer.timer_period_ns = nanoseconds
+                timer.reset()
         now, failed = time.monotonic(), None
         for due, each in tuple(calls):
             try:
@@ -45,4 +49,5 @@ def every(node: Node, period: float, call: Callable[[], object]) -> None:
             raise failed
 
     ahead = max(0.001, period - time.monotonic() % period)
-    timer = node.create_timer(ahead, on_period, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    made.append(node.create_timer(ahead, on_period, clock=steady))
