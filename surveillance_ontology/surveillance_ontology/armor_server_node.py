@@ -76,8 +76,8 @@ class ArmorServer(PatrolNode):
         )
         # Steady time: a simulated clock may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
+        # It runs once: what the store found is told before anybody spins the node, and not again.
         self._pause = self.create_timer(PUBLISH_DELAY, self._on_pause, clock=steady)
-        self._pause.cancel()
         self._pools: list[AwaitedWork] = []
         self._work, self._queries = self._turns(), self._turns(QUERIES)
         # Apart from each other and from the rest: a disk may not answer.

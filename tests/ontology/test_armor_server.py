@@ -58,6 +58,20 @@ def test_an_inconsistent_ontology_is_told_to_whoever_looks_at_health(graph: Any)
     graph.until(lambda: not server.health.findings())
 
 
+def test_an_ontology_that_a_restart_finds_inconsistent_is_told_as_well(
+    graph: Any, tmp_path: Path
+) -> None:
+    kept = {'store': str(tmp_path / 'store')}
+    server = graph.add(ArmorServer, kept)
+    armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)
+    build_seven_rooms(armor, True, False)
+    armor.manipulation.add_ind_to_class('D1', 'ROOM')
+    armor.utils.sync_buffered_reasoner()
+    graph.remove(server)
+    server = graph.add(ArmorServer, kept)
+    graph.until(lambda: [text for _, text in server.health.findings()] == ['map is inconsistent'])
+
+
 def test_a_callback_awaits_the_same_methods(graph: Any) -> None:
     graph.add(ArmorServer)
     armor = ArmorClient(graph.node, 'test', 'map', timeout=60.0)

@@ -100,6 +100,10 @@ class Workspace:
         It is called inside the directive that caused the change and must be quick.
         """
         self._watchers.append(watcher)
+        for name in self.references.names():
+            # What was opened before him is told to nobody again.
+            if (ref := self.references.get(name)) is not None and not ref.kb.consistent:
+                watcher(name, Changes(0, (), (), consistent=False))
 
     def tell(self, name: str, changes: Changes | None) -> None:
         """Tell the watchers of a change."""

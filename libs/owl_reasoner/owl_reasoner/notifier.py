@@ -110,9 +110,9 @@ class Notifier:
         self._derived(engine, come, gone)
 
     def began(self, engine: Engine) -> None:
-        """Take what a new engine shows for known, without telling it."""
+        """Take what a new engine shows for known, without telling it; a contradiction is told."""
         self._show(engine)
-        self._consistent = engine.consistent
+        self._derived(engine, (), ())
 
     def _show(self, engine: Engine | None) -> None:
         special = engine is not None and (not engine.consistent or bool(engine.equality.members))
