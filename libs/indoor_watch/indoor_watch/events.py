@@ -484,7 +484,7 @@ class EventBook:
         first, in_visit = self._ending.setdefault(number, (seen, visit))
         is_apart = (
             visit != in_visit
-            or seen.stamp - first.stamp >= OFF_DELAY
+            or abs(seen.stamp - first.stamp) >= OFF_DELAY
             or _apart(first.seen_from, seen.seen_from)
         )
         if is_apart:

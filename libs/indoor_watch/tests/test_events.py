@@ -59,6 +59,7 @@ def test_what_no_rule_cares_for_begins_nothing_and_ends_what_it_contradicts():
     [
         ({'stamp': 209.9}, 1, False),
         ({'stamp': 210.0}, 1, True),
+        ({'stamp': 180.0}, 1, True),  # the clock was set back
         ({'stamp': 201.0}, 2, True),
         ({'stamp': 201.0, 'seen_from': (0.6, 0.0)}, 1, True),
         ({'stamp': 201.0, 'seen_from': (0.4, 0.0)}, 1, False),
