@@ -299,6 +299,33 @@ def test_a_robot_that_sees_and_that_nobody_commands_stands_as_soon_as_ever(
     assert sent[-1] == 0.0, 'within the standstill of the first command that did not come'
 
 
+def test_a_robot_that_slows_down_while_it_is_blind_gains_no_time_by_that(
+    graph: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Velocity] = []
+
+    def patience(velocity: Velocity) -> float:
+        asked.append(velocity)
+        return LONGEST_SILENCE
+
+    base = CommandPublisher(
+        *(graph.node, 'cmd_vel', ['scan'], DECELERATION, lambda _topic: None), patience=patience
+    )
+    monkeypatch.setattr(base, '_publisher', SimpleNamespace(publish=lambda _: None))
+    now = 0.0
+    monkeypatch.setattr(base, '_now', lambda: now)
+    for count in range(30):
+        now = 0.1 * count
+        base.hear('scan')
+        base.command(Velocity(0.5, 0.2))
+    for step in range(3, 7):
+        now = 2.9 + 0.1 * step
+        base.command(Velocity(0.1, 0.04))
+    assert [each.speed for each in asked] == pytest.approx([0.5] * len(asked))
+    assert [each.turn for each in asked] == pytest.approx([0.2] * len(asked)), 'the same arc'
+    assert asked
+
+
 def test_commands_that_are_repeated_while_scans_are_late_are_not_expected_as_often() -> None:
     age = SensorAge(['scan', 'wanted'], DECELERATION, commands='wanted')
     for count in range(30):

@@ -256,15 +256,18 @@ class CommandPublisher:
         """Return the part of what is wanted that goes out."""
         speed = abs(self.wanted.speed)
         if self._age.share(speed, now) == 1.0:
-            self._top = speed
+            self._top = max(self._top, speed) if self._age.is_blind(now) else speed
             return 1.0
+        # Whoever commands may brake for the same silence: that is not to count twice.
+        top = max(self._top, speed)
         if self._more is None:
             longest = self._standstill
             if self._patience is not None and self._age.is_blind(now):
-                longest = self._patience(self.wanted)
+                # Of the speed it had: slower now, it came nearer all the same.
+                faster = top / speed if speed else 1.0
+                wanted = Velocity(self.wanted.speed * faster, self.wanted.turn * faster)
+                longest = self._patience(wanted)
             self._more = max(0.0, longest - self._standstill)
-        # Whoever commands may brake for the same silence: that is not to count twice.
-        top = max(self._top, speed)
         # A new command, too, is for a little later: else it would end what the last one began.
         share = self._age.share(top, now + LEAD, self._more)
         return min(1.0, share * top / speed) if speed else share
