@@ -294,6 +294,7 @@ class InputWatch:
             if why := self._refused(topic):
                 lines = [f'{topic}: what comes is of no use: {why}']
             else:
-                lines = list(findings(self._wanted[topic], seen, round(self._silent[topic], 1)))
+                # For how long by now is no news: each other text would be told anew.
+                lines = list(findings(self._wanted[topic], seen, round(PATIENCE)))
             if lines:
                 self._node.incidents.begin(('robot', topic), '; '.join(lines), Severity.ALARM)

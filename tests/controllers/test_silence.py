@@ -115,6 +115,22 @@ def test_time_in_which_nobody_spun_the_node_is_no_silence(graph: Any) -> None:
     assert told_at(66.6 + PATIENCE)
 
 
+def test_a_publisher_that_says_nothing_is_told_of_once(graph: Any) -> None:
+    said = graph.said()
+    node = graph.add(PatrolNode, name='driving')
+    odom = next(each for each in awaited(RobotProfile()) if each.topic == '/odom')
+    graph.node.create_publisher(Odometry, 'odom', SENSOR_QOS)
+    graph.until(lambda: node.count_publishers('/odom') == 1)
+    clock = [0.0]
+    watch = InputWatch(node, [odom], lambda: ['/odom'], now=lambda: clock[0])
+    for step in range(20):
+        clock[0] = 2.0 * step
+        watch._look()
+    node.get_logger().info('the last word')  # each line of a node comes after those before it
+    graph.until(lambda: any('the last word' in line for line in said))
+    assert sum('nothing came for' in line for line in said) == 1, 'how long by now is no news'
+
+
 def test_odometry_that_is_no_number_is_told_as_such(graph: Any) -> None:
     node = graph.add(PatrolNode, name='driving')
     poses: list[Any] = []
