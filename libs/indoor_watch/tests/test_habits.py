@@ -125,3 +125,15 @@ def test_what_was_learned_outlives_a_restart():
     again.restore(json.loads(json.dumps(habits.state())))
     moment = MONDAY + timedelta(weeks=5, hours=26)
     assert again.usual(door(moment, 'open')) == habits.usual(door(moment, 'open'))
+
+
+def test_what_an_earlier_version_learned_is_read_and_its_days_begin_anew():
+    model = PeriodicState()
+    for day in range(5):
+        model.learn(day != 3, 86_400.0 * day + 3600.0)
+    numbers = model.to_json()
+    waves_end = len(numbers) - len(model.days.to_json())
+    earlier = [numbers[0], 3600.0, 86_400.0 * 4 + 3600.0, *numbers[1:waves_end]]
+    found = PeriodicState.from_json(earlier)
+    assert (found.count, found.total, found.values) == (5, 4.0, model.values)
+    assert found.at_most(False, 3600.0) > 0.9, 'no day is known near that hour'
