@@ -263,10 +263,9 @@ class Localiser:
         there = self._fit.evidence(likeliest, thin.thinned(self.parameters.cast_rays))
         if there.log_likelihood < evidence.log_likelihood:
             return evidence
-        # A robot that is unsure goes on from the likeliest pose, unless that explains less than is
-        # usual here: then people all around say little of where it is.
-        usual = self._usual - self.parameters.doubt_drop / 2
-        is_plain = self._shaken and there.fit >= usual
+        # A robot that is unsure goes on from the likeliest pose, unless much is hidden there, as by
+        # people all around: that says little of where it is.
+        is_plain = self._shaken and there.fit >= self.parameters.doubt_below
         if not self._belief.follow_best(0.0 if is_plain else SURE):
             return evidence
         self.jumps += 1
