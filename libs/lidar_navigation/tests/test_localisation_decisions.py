@@ -324,15 +324,21 @@ def test_a_rival_that_is_as_likely_as_the_pose_is_not_followed() -> None:
 
 
 @pytest.mark.parametrize(
-    ('here', 'there', 'odds', 'pose'),
-    [(0.93, 0.95, 0.3, FAR), (0.6, 0.62, 1.0, HERE), (0.6, 0.62, 3.1, FAR)],
-    ids=['as usual', 'among people', 'among people, beyond doubt'],
+    ('usual', 'here', 'there', 'odds', 'pose'),
+    [
+        (1.0, 0.93, 0.95, 0.3, FAR),
+        (1.0, 0.6, 0.62, 1.0, HERE),
+        (1.0, 0.6, 0.62, 3.1, FAR),
+        (0.7, 0.6, 0.68, 1.0, HERE),
+    ],
+    ids=['as usual', 'among people', 'among people, beyond doubt', 'among people for long'],
 )
 def test_an_unsure_robot_goes_on_from_the_likeliest_pose_unless_people_hide_what_tells(
-    here: float, there: float, odds: float, pose: Pose
+    usual: float, here: float, there: float, odds: float, pose: Pose
 ) -> None:
     localiser = Told()
     localiser._shaken = True
+    localiser._usual = usual
     localiser._belief.rivals = [Rival(FAR, odds)]
     localiser.worth = lambda pose: {HERE: here, FAR: there}.get(pose, 0.0)
     localiser.see(SCAN, 0.0)
