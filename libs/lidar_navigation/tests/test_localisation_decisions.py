@@ -330,8 +330,15 @@ def test_a_rival_that_is_as_likely_as_the_pose_is_not_followed() -> None:
         (1.0, 0.6, 0.62, 1.0, HERE),
         (1.0, 0.6, 0.62, 3.1, FAR),
         (0.7, 0.6, 0.68, 1.0, HERE),
+        (1.0, 0.1, 0.78, 0.1, FAR),
     ],
-    ids=['as usual', 'among people', 'among people, beyond doubt', 'among people for long'],
+    ids=[
+        'as usual',
+        'among people',
+        'among people, beyond doubt',
+        'among people for long',
+        'furnished, told by this scan',
+    ],
 )
 def test_an_unsure_robot_goes_on_from_the_likeliest_pose_unless_people_hide_what_tells(
     usual: float, here: float, there: float, odds: float, pose: Pose

@@ -264,9 +264,10 @@ class Localiser:
         if there.log_likelihood < evidence.log_likelihood:
             return evidence
         # A robot that is unsure goes on from the likeliest pose, unless much is hidden there, as by
-        # people all around: that says little of where it is.
-        is_plain = self._shaken and there.fit >= self.parameters.doubt_below
-        if not self._belief.follow_best(0.0 if is_plain else SURE):
+        # people all around, and this scan alone does not tell the two poses apart.
+        is_told = told(there.log_likelihood - evidence.log_likelihood) >= SURE
+        is_plain = is_told or there.fit >= self.parameters.doubt_below
+        if not self._belief.follow_best(0.0 if self._shaken and is_plain else SURE):
             return evidence
         self.jumps += 1
         return there
