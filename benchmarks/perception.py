@@ -641,29 +641,65 @@ def print_natural(count: int) -> None:
     )
 
 
+def row_of_panels(generator: np.random.Generator, apart: float) -> list[Panel]:
+    """Return three known markers beside each other, so many pixels apart."""
+    ids = generator.choice(sorted(KNOWN), 3, replace=False).tolist()
+    return [
+        Panel(
+            marker_id,
+            float(generator.uniform(2, 8)),
+            float(generator.uniform(-1, 1)),
+            offset=(apart * (place - 1.0), float(generator.uniform(-100, 100))),
+        )
+        for place, marker_id in enumerate(ids)
+    ]
+
+
+def board_of_panels() -> list[Panel]:
+    """Return 32 markers in four rows, which fill an image of 1920x1080."""
+    return [
+        Panel(row * 8 + column, 2.5, 0.1, offset=(202.0 * (column - 3.5), 208.0 * (row - 1.5)))
+        for row in range(4)
+        for column in range(8)
+    ]
+
+
 def print_times(count: int) -> None:
     """Processor time of small images, and of large ones in front of textures."""
     rows = []
-    for title, camera, offset in (
-        ('640x480, indoors', CAMERA, 120),
-        ('1920x1080, textured', CameraModel.from_field_of_view(1920, 1080, 1.2), 400),
-    ):
+    full_hd = CameraModel.from_field_of_view(1920, 1080, 1.2)
+    twelve_megapixels = CameraModel.from_field_of_view(4000, 3000, 1.2)
+    few = math.ceil(count / 5)
+    shown_by: list[
+        tuple[str, CameraModel, bool, int, Callable[[np.random.Generator], list[Panel]]]
+    ] = [
+        ('640x480, indoors', CAMERA, False, count, lambda each: row_of_panels(each, 120)),
+        (
+            '640x480, one, textured',
+            CAMERA,
+            True,
+            count,
+            lambda each: [panel(each.uniform(1.5, 6), each.uniform(0, 60), each)],
+        ),
+        ('1920x1080, textured', full_hd, True, count, lambda each: row_of_panels(each, 400)),
+        ('1920x1080, board', full_hd, True, few, lambda _: board_of_panels()),
+        (
+            '4000x3000, textured',
+            twelve_megapixels,
+            True,
+            few,
+            lambda each: row_of_panels(each, 900),
+        ),
+    ]
+    for title, camera, textured, images, panels_in in shown_by:
         detectors = {'OpenCV': opencv_defaults(), 'here': this_project()}
         seconds: dict[str, list[float]] = {name: [] for name in detectors}
         found, shown = dict.fromkeys(detectors, 0), 0
-        for index in range(count):
+        for index in range(images):
             generator = np.random.default_rng([9, index])
-            kind = TEXTURES[index % len(TEXTURES)] if camera is not CAMERA else indoors(generator)
-            ids = generator.choice(sorted(KNOWN), 3, replace=False).tolist()
-            panels = [
-                Panel(
-                    marker_id,
-                    float(generator.uniform(2, 8)),
-                    float(generator.uniform(-1, 1)),
-                    offset=(offset * (place - 1.0), float(generator.uniform(-100, 100))),
-                )
-                for place, marker_id in enumerate(ids)
-            ]
+            kind = TEXTURES[index % len(TEXTURES)] if textured else indoors(generator)
+            panels = panels_in(generator)
+            ids = {each.marker_id for each in panels}
             ground = backdrop_of(kind, camera, generator)
             image = image_of(panels, camera, DICTIONARY, ground, SHARP, generator)
             shown += len(panels)
@@ -671,7 +707,7 @@ def print_times(count: int) -> None:
                 start = time.thread_time()
                 seen = detect(image)
                 seconds[name].append(time.thread_time() - start)
-                found[name] += len({each for each, _ in seen} & set(ids))
+                found[name] += len({each for each, _ in seen} & ids)
         for name, times in seconds.items():
             milliseconds = [1e3 * each for each in (np.median(times), np.mean(times))]
             rows.append(

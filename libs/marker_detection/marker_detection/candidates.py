@@ -33,7 +33,7 @@ from marker_detection.image_sampling import (
     levels_for,
 )
 
-Outline = npt.NDArray[np.int32]
+Outline = npt.NDArray[Any]
 
 # pixels across the narrowest blob
 _LEAST_WIDTH = 2.0
@@ -46,10 +46,16 @@ _INSET = 0.5
 _LEAST_SINE = 0.3
 # pixels that are taken from blobs that touch at their corners, to part them
 _ERODED = (1, 2)
-# neighbourhood in pixels from which the halved image does
-_WIDE_WINDOW = 21
+# neighbourhood in pixels from which the halved image does, and the least one that has a middle
+_WIDE_WINDOW, _LEAST_WINDOW = 21, 3
+# pixels of an image that is looked at coarsely first. In front of textures that halves the time for
+# 12 million pixels, and in a crowd finds 32 instead of 36 of 37 markers of 10 to 16 pixels; of
+# larger ones all
+_LARGE_IMAGE = 4e6
 # blobs with one box to so many pixels, and quadrilaterals with one size to this share, are the same
 _SAME_BOX, _SAME_SIZE = 3, 0.06
+# a box's four places, each below 2^15 pixels, in one number
+_BOX_PLACES = 1 << np.array([0, 15, 30, 45])
 # places that `BorderCheck` looks at along each side, and along each side of the code
 _PER_SIDE, _INNER = 6, 5
 # cells beyond the border at which its white margin is looked for: a pixel of a large marker too
@@ -94,7 +100,10 @@ def dark_masks(
         image: (height, width) grey levels.
         windows: Sides in pixels of the neighbourhoods that a border is compared with, odd; one
             mask for each, in their order. Wide ones, which only large markers need, are taken
-            from the halved image.
+            from the halved image. Of a large image the halved one comes first: a crowd in it ends
+            the search before the image itself is looked at, as in ArUco's third version
+            (Romero-Ramirez et al., "Speeded up detection of squared fiducial markers", Image and
+            Vision Computing 76, 2018).
         contrast: How many grey levels darker.
         bridges: Lengths in pixels of gaps to close in the narrowest window's mask, along columns
             and along rows, each in a mask of its own: a marker seen at a flat angle has a border
@@ -110,17 +119,25 @@ def dark_masks(
     """
     half = halved(image)
     white = float(np.percentile(half[::4, ::4], 98.0))
-    yield Mask(_bytes(cv2.threshold(image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1]))
+    large = image.size > _LARGE_IMAGE
+    black = cv2.threshold(half if large else image, white / 4.0, 255, cv2.THRESH_BINARY_INV)[1]
+    yield Mask(_without_specks(_bytes(black)), 2 if large else 1)
+    if large:
+        for window in windows:
+            if (halved_window := _half_window(window)) > _LEAST_WINDOW:
+                yield Mask(_darker_than_around(half, halved_window, contrast), 2)
     full_size: list[Grey] = []
     for window in windows:
         wide = window >= _WIDE_WINDOW and window > min(windows)
         if wide:
-            yield Mask(_darker_than_around(half, max(3, window // 4 * 2 + 1), contrast), 2)
+            # of a large image that mask was among the first
+            if not large:
+                yield Mask(_darker_than_around(half, _half_window(window), contrast), 2)
         else:
             full_size.append(_darker_than_around(image, window, contrast))
             yield Mask(full_size[-1])
-    split, _ = cv2.threshold(half, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
-    yield Mask(_bytes(cv2.threshold(half, split, 255, cv2.THRESH_BINARY_INV)[1]), 2)
+    split, parted = cv2.threshold(half, 0, 255, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
+    yield Mask(_without_specks(_bytes(parted)), 2)
     if touching:
         whole = _bytes(cv2.threshold(image, split, 255, cv2.THRESH_BINARY_INV)[1])
         for dark in (*full_size, whole):
@@ -134,19 +151,29 @@ def dark_masks(
                 yield Mask(_bytes(closed), bridged=True)
 
 
+def _half_window(window: int) -> int:
+    """Return the odd side of a neighbourhood in the halved image."""
+    return max(_LEAST_WINDOW, window // 4 * 2 + 1)
+
+
 def _bytes(image: npt.NDArray[Any]) -> Grey:
     """Return what OpenCV gives, whose pixels are bytes like those of what it was given."""
     return np.asarray(image, np.uint8)
 
 
 def _darker_than_around(image: Grey, window: int, contrast: float) -> Grey:
-    """Return where an image is darker than the mean of its neighbourhood, without specks.
-
-    Blobs of one or two pixels are noise, and each would cost an outline.
-    """
+    """Return where an image is darker than the mean of its neighbourhood, without specks."""
     mask = cv2.boxFilter(image, -1, (window, window), borderType=cv2.BORDER_REPLICATE)
     cv2.subtract(mask, image, dst=mask)
     cv2.threshold(mask, contrast - 0.5, 255, cv2.THRESH_BINARY, dst=mask)
+    return _without_specks(_bytes(mask))
+
+
+def _without_specks(mask: Grey) -> Grey:
+    """Return a mask without blobs of one or two pixels.
+
+    They are noise, and each would cost an outline.
+    """
     # each pixel of a larger blob has two more of its pixels within two steps
     near = cv2.boxFilter(mask, -1, (5, 5))
     cv2.threshold(near, 2.5 * 255 / 25, 255, cv2.THRESH_BINARY, dst=near)
@@ -174,7 +201,7 @@ def quads_around(
         (n, 4, 2) corners in pixels, clockwise as seen.
     """
     found: list[Quads] = []
-    seen: set[bytes] = set()
+    seen: set[int] = set()
     for order, (mask, scale, eroded, bridged) in enumerate(masks):
         # the first mask is of black alone: what it shows is no reason to look at less elsewhere
         if order == 1:
@@ -189,21 +216,18 @@ def quads_around(
         unlike = np.abs(scatter - 1.0)
         kept = np.argsort(unlike)
         kept = kept[scatter[kept] < _MOST_SCATTER]
-        quads = []
-        # as bytes: tuples of numbers take four times as long
-        places = (boxes[kept] * scale // _SAME_BOX).view('V32').ravel().tolist()
-        for index, blob in zip(kept.tolist(), places, strict=True):
+        places = ((boxes[kept] * scale // _SAME_BOX) @ _BOX_PLACES).tolist()
+        fresh = []
+        for index, place in zip(kept.tolist(), places, strict=True):
             if len(seen) > limit and unlike[index] > _QUAD_DEVIATION:
                 break
-            if blob in seen:
-                continue
-            seen.add(blob)
-            quad = _quad_around(outlines[index])
-            if quad is not None:
-                quads.append(quad)
-        if quads:
+            if place not in seen:
+                seen.add(place)
+                fresh.append(outlines[index])
+        quads = _quads_around(fresh)
+        if len(quads):
             # a pixel's middle has whole coordinates, in a halved image as well
-            grown = _grown(_clockwise(np.array(quads, dtype=float)), _INSET + eroded)
+            grown = _grown(_clockwise(quads), _INSET + eroded)
             found.append((grown + 0.5) * scale - 0.5)
     return np.concatenate(found) if found else np.zeros((0, 4, 2))
 
@@ -230,8 +254,10 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
 
     One with far more corners than its box has pixels around it is no quadrilateral.
     """
-    # in one pass over the rows; it traces blobs and holes in opposite directions
-    outlines, _ = cv2.findContoursLinkRuns(mask)
+    # in one pass over the rows; it traces blobs and holes in opposite directions. What has fewer
+    # than four points is no quadrilateral: to join so many arrays would take long
+    traced, _ = cv2.findContoursLinkRuns(mask)
+    outlines = [outline for outline in traced if len(outline) >= 4]
     if not outlines:
         return None
     counts = np.fromiter(map(len, outlines), np.int64, len(outlines))
@@ -242,13 +268,13 @@ def _blobs_in(mask: Grey, length: float, width: float) -> _Blobs | None:
     wide, high = right - left + 1, bottom - top + 1
     large = (np.maximum(wide, high) >= length) & (np.minimum(wide, high) >= width)
     # a square has as many outline points as its box has pixels around it; foliage has far more
-    large &= (counts >= 4) & (counts <= 3 * (wide + high))
+    large &= counts <= 3 * (wide + high)
     if not large.any():
         return None
     within = large.repeat(counts)
     boxes = np.stack([left, top, right + 1, bottom + 1], axis=1)[large].astype(np.int64)
     return _Blobs(
-        [np.asarray(outlines[index], np.int32) for index in np.flatnonzero(large).tolist()],
+        [outlines[index] for index in np.flatnonzero(large).tolist()],
         boxes,
         _scatter(
             x[within] - left.repeat(counts)[within],
@@ -299,15 +325,14 @@ def distinct(quads: Quads, distance: float) -> Indices:
     return np.flatnonzero(kept)
 
 
-def _quad_around(outline: Outline) -> npt.NDArray[np.float32] | None:
-    """Return the smallest quadrilateral (4, 2) around an outline; None where it is none."""
+def _quads_around(outlines: Sequence[Outline]) -> Quads:
+    """Return the smallest quadrilaterals (n, 4, 2) around outlines, of those that have one."""
     # of the hull, not of the outline: a border that touches something or lacks a corner has no
     # polygon of four corners, but its hull is cut down to one
-    hull = cv2.convexHull(outline)
-    if len(hull) < 4:
-        return None
-    quad = cv2.approxPolyN(hull.astype(np.float32), 4, None, -1.0, False)[0]
-    return quad if len(quad) == 4 else None
+    hulls = [np.asarray(cv2.convexHull(outline), np.float32) for outline in outlines]
+    quads = [cv2.approxPolyN(hull, 4, None, -1.0, False) for hull in hulls if len(hull) >= 4]
+    four = [quad for quad in quads if quad.shape[1] == 4]
+    return np.concatenate(four).astype(float) if four else np.zeros((0, 4, 2))
 
 
 def _clockwise(quads: Quads) -> Quads:

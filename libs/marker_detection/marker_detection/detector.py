@@ -375,19 +375,28 @@ def _opencv_errors() -> Iterator[None]:
 
 def _best(found: Sequence[Detection]) -> list[Detection]:
     """Return the surest of detections that lie on each other."""
-    kept: list[Detection] = []
-    for each in sorted(found, key=lambda detection: -detection.confidence):
-        if not _covered(each.corners[None], kept).any():
-            kept.append(each)
-    return kept
+    ordered = sorted(found, key=lambda detection: -detection.confidence)
+    if len(ordered) < 2:
+        return ordered
+    covered = _covering(np.array([each.corners for each in ordered]), ordered)
+    kept: list[int] = []
+    for index in range(len(ordered)):
+        if not covered[index, kept].any():
+            kept.append(index)
+    return [ordered[index] for index in kept]
 
 
 def _covered(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:
     """Return which quads (m,) have their middle in a marker that is read."""
     if not found:
         return np.zeros(len(quads), bool)
+    return np.asarray(_covering(quads, found).any(axis=1))
+
+
+def _covering(quads: Quads, found: Sequence[Detection]) -> npt.NDArray[np.bool_]:
+    """Return in which of the markers that are read (k of them) quads have their middle, (m, k)."""
     outlines = np.array([each.corners for each in found])
     middles = outlines.mean(axis=1)
     reach = np.linalg.norm(outlines - middles[:, None], axis=2).mean(axis=1)
     apart = np.linalg.norm(quads.mean(axis=1)[:, None] - middles[None], axis=2)
-    return np.asarray((apart < _COVER * reach).any(axis=1))
+    return np.asarray(apart < _COVER * reach)

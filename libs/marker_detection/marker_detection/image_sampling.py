@@ -24,6 +24,8 @@ Grey = npt.NDArray[np.uint8]
 _TO_UNIT_SQUARE = np.array([[0.5, 0.0, 0.5], [0.0, 0.5, 0.5], [0.0, 0.0, 1.0]])
 _CORNERS = np.array([[-1.0, -1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0]])
 _LAST_LEVEL = 5
+# rows that OpenCV's `remap` takes at once: it asks for fewer than SHRT_MAX
+_MOST_ROWS = 2**15 - 2
 # pixels of the read image that a sample lies at least from the middles of the outermost ones
 _INSIDE = 0.5
 
@@ -86,10 +88,17 @@ class ImagePyramid:
     def _read(self, x: Patches, y: Patches, level: int) -> Patches:
         while len(self._levels) <= level:
             self._levels.append(halved(self._levels[-1]))
-        sampled = cv2.remap(
-            self._levels[level], x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
-        return np.asarray(sampled, dtype=np.float32)
+        sampled = np.empty(x.shape, np.float32)
+        for start in range(0, len(x), _MOST_ROWS):
+            part = slice(start, start + _MOST_ROWS)
+            sampled[part] = cv2.remap(
+                self._levels[level],
+                x[part],
+                y[part],
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            )
+        return sampled
 
 
 def halved(image: Grey) -> Grey:

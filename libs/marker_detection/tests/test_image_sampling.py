@@ -146,3 +146,16 @@ def test_samples_behind_the_camera_or_infinitely_far_are_not_of_the_image(depth)
     homography = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, depth]]])
     place = np.array([[-150.0], [-150.0], [1.0]], np.float32)
     assert pyramid.shown(homography, place, np.array([0])).tolist() == [[False]]
+
+
+def test_more_candidates_are_read_than_opencv_maps_at_once():
+    image = GENERATOR.integers(0, 256, (48, 64)).astype(np.uint8)
+    places = GENERATOR.uniform(0.0, 40.0, (2**15 + 5, 2))
+    homographies = np.tile(np.eye(3), (len(places), 1, 1))
+    homographies[:, :2, 2] = places
+    middle = np.array([[0.0], [0.0], [1.0]], np.float32)
+    levels = np.zeros(len(places), int)
+    read = ImagePyramid(image).sample(homographies, middle, levels)
+    for part in (slice(0, 5), slice(-10, None)):
+        alone = ImagePyramid(image).sample(homographies[part], middle, levels[part])
+        assert read[part] == pytest.approx(alone)
