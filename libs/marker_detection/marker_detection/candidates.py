@@ -49,7 +49,7 @@ _ERODED = (1, 2)
 # neighbourhood in pixels from which the halved image does, and the least one that has a middle
 _WIDE_WINDOW, _LEAST_WINDOW = 21, 3
 # pixels of an image that is looked at coarsely first. In front of textures that halves the time for
-# 12 million pixels, and in a crowd finds 32 instead of 36 of 37 markers of 10 to 16 pixels; of
+# 12 million pixels, and finds there 32 instead of 36 of 37 markers of 10 to 16 pixels; of
 # larger ones all
 _LARGE_IMAGE = 4e6
 # blobs with one box to so many pixels, and quadrilaterals with one size to this share, are the same
