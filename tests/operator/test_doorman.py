@@ -92,3 +92,20 @@ def test_one_that_leaves_is_forgotten_and_an_end_ends_all(door: Callable[..., Do
     place.close()
     assert silent.recv(1) == b''
     silent.close()
+
+
+def test_a_page_that_is_stopped_while_it_starts_accepts_nobody_and_says_nothing() -> None:
+    doors: list[Doorman] = []
+
+    class Stopping(socket.socket):
+        """A listening socket, in the middle of whose start the page is stopped."""
+
+        def setblocking(self, flag: bool) -> None:
+            super().setblocking(flag)
+            doors[0].stop()
+
+    listening = Stopping(socket.AF_INET, socket.SOCK_STREAM)
+    listening.bind(('127.0.0.1', 0))
+    doors.append(Doorman(listening, lambda _begun: False, lambda *_: None, 5, 5.0))
+    doors[0].start()
+    assert listening.fileno() == -1

@@ -52,13 +52,13 @@ class Doorman:
         self._thread = threading.Thread(target=self._run, name='page door', daemon=True)
 
     def start(self) -> None:
-        """Begin to accept; nothing where it was stopped before."""
+        """Begin to accept; nothing where it was stopped before, or is meanwhile."""
         try:
             self._listening.listen(1024)
             self._listening.setblocking(False)
-        except OSError:
+            self._selector.register(self._listening, selectors.EVENT_READ)
+        except (OSError, ValueError):  # a closed socket is no file for a selector
             return
-        self._selector.register(self._listening, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
         self._thread.start()
 
