@@ -84,4 +84,5 @@ def notify(text: str) -> None:
     address = os.environ[_SOCKET]
     kind = socket.SOCK_DGRAM | socket.SOCK_NONBLOCK  # a systemd that hangs is not waited for
     with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, kind) as sender:
-        sender.sendto(text.encode(), address.replace('@', '\0', 1))
+        # A leading @ stands for the zero byte of an abstract name (sd_notify(3)).
+        sender.sendto(text.encode(), f'\0{address[1:]}' if address[0] == '@' else address)

@@ -8,6 +8,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import tempfile
 import uuid
 from pathlib import Path
 
@@ -77,6 +78,20 @@ def test_a_service_that_is_stopped_with_its_machine_goes_on_later(start, tmp_pat
             assert service.end(signal.SIGTERM)[0] == 0
     (folder,) = runs.iterdir()
     assert f'continuing {folder}, which was not finished' in '\n'.join(service.lines)
+
+
+def test_only_a_leading_at_sign_stands_for_an_abstract_name(monkeypatch):
+    with (
+        tempfile.TemporaryDirectory(dir='/tmp') as folder,  # a path has to be short
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener,
+    ):
+        path = f'{folder}/user@1000'
+        listener.bind(path)
+        listener.setblocking(False)
+        monkeypatch.setenv('NOTIFY_SOCKET', path)
+        monkeypatch.delenv('SYSTEMD_EXEC_PID', raising=False)
+        notify('READY=1')
+        assert listener.recv(100) == b'READY=1'
 
 
 def test_systemd_is_told_where_it_listens(tmp_path, monkeypatch):
